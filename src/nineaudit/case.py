@@ -1,0 +1,101 @@
+"""A recording with what every check needs of it, each computed once.
+
+The zero of a channel is its mean over the quiet interval before the event (SAE J1727); the mean of the gravity
+that the accelerometers see there goes with it, which the constraints do not feel (METHODS.md 1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nineaudit.array import BoolArray, FloatArray, SensorArray
+from nineaudit.errors import EstimationError
+from nineaudit.estimate.motion import Motion, estimate_motion
+from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
+from nineaudit.physics import nap
+from nineaudit.recording import Recording
+
+NOMINAL_NOISE = 1e-3
+"""Last resort for a noise level, as a part of the channel's peak, where neither rig nor recording tells."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """`recording` and its derived quantities; SI, columns in the order of ``recording.rig.array``."""
+
+    recording: Recording
+
+    @property
+    def array(self) -> SensorArray:
+        return self.recording.rig.array
+
+    @property
+    def time(self) -> FloatArray:
+        """(n,) s."""
+        return self.recording.time
+
+    @cached_property
+    def rest(self) -> Quiet | None:
+        """The quiet interval: the rig's pre_trigger, or the quietest stretch that looks like rest, or None."""
+        stated = self.recording.rig.pre_trigger
+        return find_quiet(self.time, self.recording.readings, self.array.values("noise"), stated)
+
+    @property
+    def required_rest(self) -> Quiet:
+        """The quiet interval; EstimationError where there is none."""
+        if self.rest is None:
+            raise EstimationError(
+                "no quiet interval was found",
+                advice="state [recording] pre_trigger in the rig file, with the body at rest",
+            )
+        return self.rest
+
+    @cached_property
+    def zero(self) -> FloatArray:
+        """(k,) mean over the quiet interval; 0 where there is none, or no valid sample in it."""
+        if self.rest is None:
+            return np.zeros(len(self.array))
+        window = self.recording.readings[self.rest.samples]
+        count = np.isfinite(window).sum(axis=0)
+        return np.asarray(np.nansum(window, axis=0) / np.maximum(count, 1))
+
+    @cached_property
+    def readings(self) -> FloatArray:
+        """(n,k) with the zero taken off; NaN where invalid."""
+        return np.asarray(self.recording.readings - self.zero)
+
+    @property
+    def valid(self) -> BoolArray:
+        """(n,k)"""
+        return self.recording.valid
+
+    @cached_property
+    def sigma(self) -> FloatArray:
+        """(k,) noise standard deviation: the rig's, else measured in the quiet interval, else from differences.
+
+        Never below a quarter of the channel's quantisation step over √3 (uniform rounding noise, GUM F.2.2.1
+        gives step/√12), so that no weight is infinite.
+        """
+        stated = self.array.values("noise")
+        measured = noise_level(self.recording.readings, None if self.rest is None else self.rest.samples)
+        with np.errstate(invalid="ignore"):
+            peak = np.nan_to_num(np.nanmax(np.abs(self.readings), axis=0, initial=0.0))
+        floor = np.maximum(NOMINAL_NOISE * peak, 1e-9)
+        return np.where(np.isfinite(stated) & (stated > 0), stated, np.where(measured > 0, measured, floor))
+
+    @cached_property
+    def motion(self) -> Motion:
+        """ω, α, a0 of the body as the array gives them, all channels taken at their word.
+
+        EstimationError where the array cannot tell them.
+        """
+        return estimate_motion(self.array, self.time, self.readings, self.sigma)
+
+    @cached_property
+    def nap_layout(self) -> tuple[tuple[int, ...], FloatArray] | None:
+        """Columns (9,) and arms (3,) of an ideal 3-2-2-2 inside the array, None where it has none."""
+        found = nap.layout(self.array)
+        return None if found is None else (tuple(int(c) for c in found[0]), np.asarray(found[1], dtype=float))

@@ -1,0 +1,59 @@
+"""What can go wrong with what a user gives us, each with its place, its advice and its exit code.
+
+One sentence reaches the user: ``file: place: what is wrong; found X; expected Y; what to do``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_MISSING = object()
+
+
+class NineauditError(Exception):
+    """An error that a user can mend. ``exit_code`` is what the command line returns for it.
+
+    Parameters: `what` is wrong; `file` and `place` (line, key, channel, byte) where; what was
+    `found`; what was `expected`; and the `advice` that mends it. ``str()`` is the whole sentence.
+    """
+
+    exit_code = 3
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        file: str | Path | None = None,
+        place: str | None = None,
+        found: object = _MISSING,
+        expected: str | None = None,
+        advice: str | None = None,
+    ) -> None:
+        self.what, self.file, self.place = what, file, place
+        self.found, self.expected, self.advice = found, expected, advice
+        head = ": ".join(str(part) for part in (file, place, what) if part)
+        tail = [
+            "" if found is _MISSING else f"found {found!r}",
+            f"expected {expected}" if expected else "",
+            advice or "",
+        ]
+        super().__init__("; ".join(part for part in (head, *tail) if part))
+
+
+class ConfigurationError(NineauditError):
+    """A rig file, rule sheet, waiver file, database or option is wrong (exit code 2)."""
+
+    exit_code = 2
+
+
+class RecordingError(NineauditError):
+    """A recording cannot be read or does not carry what the rig asks for (exit code 3)."""
+
+    exit_code = 3
+
+
+class EstimationError(NineauditError):
+    """A foreseen numerical failure: singular geometry, no rest interval, no convergence.
+
+    The engine turns it into a NOT_EVALUATED finding with this reason; it never counts as a pass.
+    """

@@ -1,0 +1,91 @@
+"""A recording as it came from the rig: traces with their own clocks, and one common time base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nineaudit.array import BoolArray, FloatArray
+
+if TYPE_CHECKING:  # the rig is a value of the same floor; only its name is needed here
+    from nineaudit.rig import Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One signal with its own clock as recorded: `time` (m,) s, `values` (m,) in `unit`.
+
+    `unit` is what the file says, None where it does not say. `signal` is its name in the file.
+    """
+
+    channel: str
+    signal: str
+    time: FloatArray
+    values: FloatArray
+    unit: str | None = None
+
+
+@dataclass(frozen=True)
+class Clock:
+    """What the time stamps of one trace did. Times in s, rate in Hz.
+
+    `gaps` are intervals longer than 1.5 sampling intervals, as (start, end); `lost` is about how many samples
+    they hold. Duplicate and backward samples are not in the recording's arrays: they are counted here.
+    """
+
+    rate: float
+    jitter: float
+    gaps: tuple[tuple[float, float], ...] = ()
+    lost: int = 0
+    duplicates: int = 0
+    backward: int = 0
+    first_disorder: float | None = None
+
+
+@dataclass(frozen=True)
+class Source:
+    """The file that was read. `counts`: what its container held (frames, error frames, ...); `notes`: in words."""
+
+    path: Path
+    format: str
+    sha256: str
+    size: int
+    unchanged_after_read: bool = True
+    counts: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Readings of a rig on one time base: `time` (n,) s increasing, `readings` (n,k) SI, `valid` (n,k).
+
+    Columns follow ``rig.array``. Invalid readings are NaN. `native` are the traces in SI on their own clocks
+    (the same arrays where the clocks agree), for checks that must see samples as they were taken; `resampled`
+    names the channels whose readings were interpolated onto the common time base.
+    """
+
+    time: FloatArray
+    readings: FloatArray
+    valid: BoolArray
+    rig: Rig
+    source: Source
+    native: tuple[Trace, ...]
+    clocks: tuple[Clock, ...]
+    resampled: tuple[str, ...] = ()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        return self.rig.array.channels
+
+    @property
+    def rate(self) -> float:
+        """Samples per second of the common time base, from the median interval."""
+        return float(1.0 / np.median(np.diff(self.time)))
+
+    def column(self, channel: str) -> FloatArray:
+        """(n,) readings of one channel, SI."""
+        return self.readings[:, self.rig.array.index(channel)]
