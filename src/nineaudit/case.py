@@ -92,7 +92,8 @@ class Case:
 
         EstimationError where the array cannot tell them.
         """
-        return estimate_motion(self.array, self.time, self.readings, self.sigma)
+        start = None if self.rest is None else self.rest.start
+        return estimate_motion(self.array, self.time, self.readings, self.sigma, start)
 
     @cached_property
     def nap_layout(self) -> tuple[tuple[int, ...], FloatArray] | None:

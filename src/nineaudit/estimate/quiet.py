@@ -42,7 +42,7 @@ def find_quiet(
     over the whole record. Raises ConfigurationError when a stated interval holds fewer than 16 samples.
     """
     if stated is not None:
-        start, stop = np.searchsorted(time, [stated[0], stated[1]], side="left")
+        start = int(np.searchsorted(time, stated[0], side="left"))
         stop = int(np.searchsorted(time, stated[1], side="right"))
         if stop - start < SHORTEST:
             raise ConfigurationError(
@@ -51,7 +51,7 @@ def find_quiet(
                 found=list(stated),
                 expected=f"at least {SHORTEST} samples between {time[0]:.6g} s and {time[-1]:.6g} s",
             )
-        return Quiet(int(start), stop, float(time[start]), float(time[stop - 1]), stated=True)
+        return Quiet(start, stop, float(time[start]), float(time[stop - 1]), stated=True)
     return _quietest(time, readings, noise)
 
 
