@@ -1,0 +1,249 @@
+"""The rig file's tables as pydantic models: what editors complete and what `rig check` holds a file to.
+
+Numbers stay in the units of the file; rig.py converts them. Imported only where a rig file is read, since
+pydantic is slow to load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from nineaudit.errors import ConfigurationError
+from nineaudit.presets import PRESETS, nearest
+from nineaudit.units import FACTORS, Quantity, factor
+
+FILTER_CLASSES = ("none", "CFC60", "CFC180", "CFC600", "CFC1000")
+UNIT_NAMES: dict[Quantity, tuple[str, ...]] = {
+    "length": tuple(FACTORS["length"]),
+    "acceleration": (*FACTORS["acceleration"], "mV"),
+    "angular_rate": (*FACTORS["angular_rate"], "mV"),
+    "time": tuple(FACTORS["time"]),
+}
+
+
+def _canonical(value: str, quantity: Quantity) -> str | None:
+    """The file's name of a unit that was spelled another way (``g``, ``m/s²``), or None."""
+    try:
+        size = factor(value, quantity)
+    except ConfigurationError:
+        return nearest(value, UNIT_NAMES[quantity])
+    return next(name for name, known in FACTORS[quantity].items() if known == size)
+
+
+def _unit(quantity: Quantity) -> Callable[[str], str]:
+    def check(value: str) -> str:
+        if value not in UNIT_NAMES[quantity]:
+            close = _canonical(value, quantity)
+            raise PydanticCustomError(
+                "unit",
+                "one of {names}",
+                {
+                    "names": ", ".join(UNIT_NAMES[quantity]),
+                    "advice": f"did you mean {close!r}?" if close else "",
+                },
+            )
+        return value
+
+    return check
+
+
+def _filter_class(value: str) -> str:
+    for name in FILTER_CLASSES:
+        if value.lower() == name.lower():
+            return name
+    raise PydanticCustomError("filter_class", "one of {names}", {"names": ", ".join(FILTER_CLASSES)})
+
+
+def _ordered(value: list[float]) -> list[float]:
+    if not value[0] < value[1]:
+        raise PydanticCustomError("order", "[start, end] in seconds with start before end")
+    return value
+
+
+def _direction(value: list[float]) -> list[float]:
+    if not any(value):
+        raise PydanticCustomError("direction", "a vector of non-zero length")
+    return value
+
+
+def _names(*names: str) -> dict[str, Any]:
+    return {"enum": list(names)}
+
+
+Text = Annotated[str, Field(min_length=1, pattern=r"^\S(.*\S)?$")]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Deviation = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+LengthUnit = Annotated[
+    str, AfterValidator(_unit("length")), Field(json_schema_extra=_names(*UNIT_NAMES["length"]))
+]
+AccelerationUnit = Annotated[
+    str, AfterValidator(_unit("acceleration")), Field(json_schema_extra=_names(*UNIT_NAMES["acceleration"]))
+]
+RateUnit = Annotated[
+    str, AfterValidator(_unit("angular_rate")), Field(json_schema_extra=_names(*UNIT_NAMES["angular_rate"]))
+]
+TimeUnit = Annotated[str, AfterValidator(_unit("time")), Field(json_schema_extra=_names(*UNIT_NAMES["time"]))]
+# Case does not matter on load; the first alternative is what editors offer.
+FilterClass = Annotated[
+    str,
+    AfterValidator(_filter_class),
+    Field(
+        json_schema_extra={
+            "anyOf": [
+                _names(*FILTER_CLASSES),
+                {"pattern": "^([Nn][Oo][Nn][Ee]|[Cc][Ff][Cc](60|180|600|1000))$"},
+            ]
+        }
+    ),
+]
+
+
+class Table(BaseModel):
+    """Strict: no unknown keys, no numbers in quotation marks, no NaN or infinity."""
+
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+class RigTable(Table):
+    """What the rig is."""
+
+    model_config = ConfigDict(json_schema_extra={"dependentRequired": {"arms": ["preset"]}})
+    name: Text | None = None
+    """Name shown in reports. Default: the preset's title, or the file's name."""
+    preset: Annotated[str, Field(json_schema_extra=_names(*PRESETS))] | None = None
+    """A published layout that fills in the sensors; a [[sensor]] table of the same channel overrides it."""
+    arms: list[float] | None = None
+    """Arm lengths of the preset, in the length unit, along x, y, z as it has them. Default: 50 mm."""
+
+
+class UnitsTable(Table):
+    """Units of this file's numbers, and of recordings that do not state their own."""
+
+    length: LengthUnit = "mm"
+    """Unit of positions and arms."""
+    acceleration: AccelerationUnit = "g_0"
+    """Unit of accelerometers: readings, range, zero, noise. mV needs a sensitivity in every sensor."""
+    angular_rate: RateUnit = "rad/s"
+    """Unit of rate sensors: readings, range, zero, noise. mV needs a sensitivity in every sensor."""
+
+
+class RecordingTable(Table):
+    """How recordings of this rig are written."""
+
+    time: Text | None = None
+    """CSV: the time column. Default: looked for by name."""
+    time_unit: TimeUnit | None = None
+    """Unit of the time column. Default: from the suffix of its name (time_ms), else s."""
+    dbc: list[Text] = []
+    """CAN databases (.dbc, .arxml, .kcd), relative to this file."""
+    pre_trigger: (
+        Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)] | None
+    ) = None
+    """Interval [start, end] in s, body at rest: zero offset, noise, omega(0) = 0. Default: looked for."""
+    filter_class: FilterClass = "none"
+    """Channel frequency class of the readings as recorded; none if unfiltered. Default: none."""
+    separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    """CSV: the field separator, one character. Default: detected."""
+    decimal: Literal[".", ","] | None = None
+    """CSV: the decimal mark. Default: detected."""
+
+
+class UncertaintyTable(Table):
+    """One standard deviation of what is not known exactly, for every sensor that does not state its own."""
+
+    gain: Deviation | None = None
+    """Sensitivity, relative. Default: 0.005."""
+    zero: Deviation | None = None
+    """Zero offset, in the sensor's unit. Default: 0.1 g_0 for accelerometers, 0.1 rad/s for rate sensors."""
+    zero_rate: Deviation | None = None
+    """Zero offset of rate sensors, in the angular-rate unit. Default: the number of zero."""
+    alignment_deg: Deviation | None = None
+    """Tilt of the sensitive axis, about each of the two axes normal to it, in degrees. Default: 0.5."""
+    position: Deviation | None = None
+    """Each coordinate of the position, in the length unit. Default: 0.5 mm."""
+    noise: Positive | None = None
+    """Noise of a reading, in the sensor's unit. Default: estimated from the quiet interval."""
+    noise_rate: Positive | None = None
+    """Noise of rate sensors, in the angular-rate unit. Default: the number of noise."""
+    timing_s: Deviation | None = None
+    """Time skew between channels, in s. Default: 1e-5."""
+
+
+class SensorTable(Table):
+    """One channel. Of a preset's channel, only what differs needs to be stated."""
+
+    channel: Text
+    """Name of the channel, unique in the rig."""
+    kind: Literal["accelerometer", "gyroscope"] | None = None
+    """Either accelerometer or gyroscope."""
+    position: Vector | None = None
+    """Position in the body frame, in the length unit. Needed for accelerometers; else without effect."""
+    axis: Annotated[Vector, AfterValidator(_direction)] | None = None
+    """Sensitive axis in the body frame; any length but zero, normalised on load."""
+    range: Positive | None = None
+    """Full scale, in the sensor's unit: where clipping is expected."""
+    signal: Text | None = None
+    """CSV: column; CAN: Message.Signal; MCAP: /topic:field.path. Default: the channel's name."""
+    serial: Text | None = None
+    """Serial number."""
+    sensitivity: Positive | None = None
+    """mV per g_0 (accelerometers) or mV per deg/s (rate sensors); needed where the unit is mV."""
+    gain: Deviation | None = None
+    """Standard uncertainty of the sensitivity, relative."""
+    zero: Deviation | None = None
+    """Standard uncertainty of the zero offset, in the sensor's unit."""
+    alignment_deg: Deviation | None = None
+    """Standard uncertainty of the axis, about each of the two axes normal to it, in degrees."""
+    position_u: Deviation | None = None
+    """Standard uncertainty of each coordinate of the position, in the length unit."""
+    noise: Positive | None = None
+    """Standard deviation of the noise, in the sensor's unit."""
+    timing_s: Deviation | None = None
+    """Standard uncertainty of the time skew, in s."""
+
+
+class PointTable(Table):
+    """A point of the body at which results are wanted."""
+
+    name: Text
+    """Name shown in reports, unique in the rig."""
+    position: Vector
+    """Position in the body frame, in the length unit."""
+
+
+_SENSOR_NEEDS: dict[str, Any] = {
+    "required": ["kind", "axis"],
+    "if": {"properties": {"kind": {"const": "accelerometer"}}},
+    "then": {"required": ["position"]},
+}
+
+
+class RigFile(Table):
+    """Rig file of nineaudit."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            "$comment": "Without a preset every sensor states its kind, axis and position.",
+            "if": {"required": ["rig"], "properties": {"rig": {"required": ["preset"]}}},
+            "else": {
+                "required": ["sensor"],
+                "properties": {"sensor": {"minItems": 1, "items": _SENSOR_NEEDS}},
+            },
+        }
+    )
+    rig: RigTable = RigTable()
+    units: UnitsTable = UnitsTable()
+    recording: RecordingTable = RecordingTable()
+    uncertainty: UncertaintyTable = UncertaintyTable()
+    sensor: list[SensorTable] = []
+    """The channels, in the order of the array."""
+    point: list[PointTable] = []
+    """Points of the body at which results are wanted besides the origin."""
