@@ -93,6 +93,10 @@ class SensorArray:
         """(k,) of one numeric attribute of the sensors, NaN where it is None."""
         return frozen([np.nan if (v := getattr(s, name)) is None else v for s in self.sensors])
 
+    def select(self, columns: Iterable[int]) -> SensorArray:
+        """The sensors of these columns, in the order given."""
+        return SensorArray(tuple(self.sensors[c] for c in columns))
+
     def subset(self, channels: Iterable[str]) -> SensorArray:
         """The same sensors less those not named, in this array's order."""
         wanted = set(channels)

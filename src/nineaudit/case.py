@@ -6,18 +6,22 @@ that the accelerometers see there goes with it, which the constraints do not fee
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray, SensorArray
 from nineaudit.errors import EstimationError
-from nineaudit.estimate.motion import Motion, estimate_motion
+from nineaudit.estimate import budget, closed_form, condense, parity
+from nineaudit.estimate.motion import Motion, bridge, estimate_motion
 from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
+from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
 from nineaudit.physics import nap
 from nineaudit.recording import Recording
 
+CFC_TO_PASS_BAND = 0.6
+"""CFC number over its −3 dB frequency: the class is 1000 for 1650 Hz (SAE J211-1)."""
 NOMINAL_NOISE = 1e-3
 """Last resort for a noise level, as a part of the channel's peak, where neither rig nor recording tells."""
 
@@ -94,6 +98,75 @@ class Case:
         """
         start = None if self.rest is None else self.rest.start
         return estimate_motion(self.array, self.time, self.readings, self.sigma, start)
+
+    @cached_property
+    def evidence(self) -> tuple[ChannelEvidence, ...]:
+        """What each channel's own trace shows against it, in the order of the array."""
+        return find_evidence(self.recording, self.sigma)
+
+    @cached_property
+    def flagged(self) -> BoolArray:
+        """(n,k) samples that their own trace shows to be wrong: flat tops, dropouts, stuck stretches, spikes."""
+        return flagged(self.recording, self.evidence)
+
+    @property
+    def trusted(self) -> FloatArray:
+        """(n,k) zeroed readings less the samples that their own trace shows to be wrong (NaN there)."""
+        return np.where(self.flagged, np.nan, self.readings)
+
+    @cached_property
+    def condensed(self) -> condense.Condensed:
+        """All readings as block means, nearly independent and at most 2000."""
+        return self._condense(self.readings)
+
+    @cached_property
+    def parity(self) -> parity.Residual:
+        """Residual of every channel against the array, on the blocks of `condensed`, flagged samples left out."""
+        blocks = self._condense(self.trusted)
+        motion = self._motion_of(self.array, blocks)
+        return parity.channel_residuals(self.array, blocks.time, blocks.readings, blocks.sigma, motion)
+
+    @cached_property
+    def alpha_budget(self) -> budget.AlphaBudget:
+        """Uncertainty of α at its peak by source, on the blocks of `condensed`."""
+        blocks = self.condensed
+        motion = self._motion_of(self.array, blocks)
+        return budget.alpha_budget(self.array, blocks.time, blocks.readings, blocks.sigma, motion)
+
+    def _motion_of(self, array: SensorArray, blocks: condense.Condensed) -> Motion:
+        start = None if self.rest is None else self.rest.start // blocks.length
+        return estimate_motion(array, blocks.time, blocks.readings, blocks.sigma, start)
+
+    def _condense(self, readings: FloatArray) -> condense.Condensed:
+        cfc = self.recording.rig.cfc
+        pass_band = None if cfc is None else cfc / CFC_TO_PASS_BAND
+        length = condense.block_length(len(self.time), self.recording.rate, pass_band)
+        rest = None if self.rest is None else self.readings[self.rest.samples]
+        return condense.Condensed(
+            condense.block_means(self.time, length),
+            condense.block_means(readings, length),
+            condense.block_noise(self.sigma, rest, length),
+            length,
+        )
+
+    @cached_property
+    def nap_problem(self) -> closed_form.Problem | None:
+        """The nine channels of an ideal 3-2-2-2, condensed, for the closed forms; None where the array has none."""
+        if self.nap_layout is None:
+            return None
+        columns, arms = self.nap_layout
+        nine, index, whole = self.array.select(columns), list(columns), self.condensed
+        readings = bridge(whole.readings[:, index], whole.time)
+        blocks = replace(whole, readings=readings, sigma=whole.sigma[index])
+        motion = self._motion_of(nine, blocks)
+        return closed_form.make_problem(nine, blocks.time, readings, blocks.sigma, motion, arms)
+
+    @cached_property
+    def nap_healthy(self) -> closed_form.Hypothesis:
+        """Fit of the healthy hypothesis to nap_problem; EstimationError where there is none."""
+        if self.nap_problem is None:
+            raise EstimationError("the array holds no ideal 3-2-2-2 layout")
+        return closed_form.fit_hypothesis(self.nap_problem, None)
 
     @cached_property
     def nap_layout(self) -> tuple[tuple[int, ...], FloatArray] | None:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray
-
-if TYPE_CHECKING:  # the rig is a value of the same floor; only its name is needed here
-    from nineaudit.rig import Rig
+from nineaudit.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

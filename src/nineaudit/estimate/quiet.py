@@ -75,6 +75,18 @@ def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray) -> Quie
     return Quiet(start, stop, float(time[start]), float(time[stop - 1]), stated=False)
 
 
+def quiet_end(time: FloatArray, readings: FloatArray, sigma: FloatArray) -> Quiet | None:
+    """The last 2 % of the record if it is quiet: median channel scatter under three times its noise, else None."""
+    start = len(time) - max(SHORTEST, len(time) // 50)
+    if start < SHORTEST:
+        return None
+    tail = slice(start, len(time))
+    ratio = noise_level(readings, tail) / sigma
+    if np.median(ratio) > 3.0 or np.mean(ratio < 3.0) < 0.75:
+        return None
+    return Quiet(start, len(time), float(time[start]), float(time[-1]), stated=False)
+
+
 def _windowed_sd(values: FloatArray, starts: np.ndarray, length: int) -> FloatArray:
     """Standard deviation (m,k) of the stretches of `length` samples from `starts`, by cumulative sums."""
     first = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])

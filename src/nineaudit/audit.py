@@ -1,0 +1,158 @@
+"""audit(recording) -> Audit: everything that can be said of one recording, the only input of every report."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from enum import StrEnum
+from functools import cached_property
+from importlib.metadata import version
+from typing import TypeVar
+
+import numpy as np
+
+from nineaudit import engine
+from nineaudit.array import BoolArray, FloatArray
+from nineaudit.case import Case
+from nineaudit.diagnose import Diagnosis, Status, diagnose
+from nineaudit.errors import EstimationError
+from nineaudit.estimate import closed_form
+from nineaudit.estimate.motion import Motion, bridge
+from nineaudit.finding import Finding, Severity, Verdict
+from nineaudit.impact import Impact, impact
+from nineaudit.physics import nap
+from nineaudit.reconstruct import Reconstruction, rebuild_channel
+from nineaudit.recording import Recording
+from nineaudit.rulebook import Rulebook, load_rulebook
+from nineaudit.waivers import Waiver
+
+
+class AuditVerdict(StrEnum):
+    PASS = "pass"
+    FAIL = "fail"
+    INCONCLUSIVE = "inconclusive"
+    NOT_AUDITED = "not_audited"
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """`findings` of every rule, the `diagnosis`, the `reconstruction` where a channel was rebuilt, its `impact`
+    on what is reported (before and after), the `verdict`, and the versions of what computed it (`tool`)."""
+
+    recording: Recording
+    case: Case
+    rulebook: Rulebook
+    findings: tuple[Finding, ...]
+    diagnosis: Diagnosis
+    reconstruction: Reconstruction | None
+    impact: Mapping[str, Impact]
+    verdict: AuditVerdict
+    tool: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        """Motion with every channel as measured; None where the array cannot tell it."""
+        return _or(lambda: self.case.motion, lambda _: None)
+
+    @cached_property
+    def constraints(self) -> FloatArray | None:
+        """(n,3) residuals of the constraint equations, rad²/s²; None for another layout than 3-2-2-2."""
+        return None if self._constraints is None else self._constraints[0]
+
+    @cached_property
+    def constraints_u(self) -> FloatArray | None:
+        """(n,3) their standard deviation from noise and calibration."""
+        return None if self._constraints is None else self._constraints[1]
+
+    @cached_property
+    def flagged(self) -> Mapping[str, BoolArray]:
+        """Channel -> (n,) samples that their own trace shows to be wrong."""
+        flagged = self.case.flagged
+        return {c: flagged[:, i] for i, c in enumerate(self.recording.channels) if flagged[:, i].any()}
+
+    @cached_property
+    def _constraints(self) -> tuple[FloatArray, FloatArray] | None:
+        problem = self.case.nap_problem
+        if problem is None or self.case.nap_layout is None:
+            return None
+        columns, arms = self.case.nap_layout
+        index = list(columns)
+        full = nap.constraint_residuals(bridge(self.case.readings[:, index], self.case.time), arms, self.case.time)
+        _, noise, budget = closed_form.constraint_budget(problem)
+        rows = nap.product_rows(arms) ** 2 @ self.case.sigma[index] ** 2
+        time, calibration = self.case.time, np.maximum(budget**2 - noise**2, 0.0)
+        spread = [np.interp(time, problem.time, calibration[:, axis]) + rows[axis] for axis in range(3)]
+        return full, np.sqrt(np.stack(spread, axis=1))
+
+
+def audit(
+    recording: Recording,
+    rulebook: Rulebook | None = None,
+    *,
+    waivers: Sequence[Waiver] | None = None,
+    today: date | None = None,
+) -> Audit:
+    """Run every rule, diagnose, rebuild the culprit if one is isolated, and judge.
+
+    `waivers` need `today`, the date they are held against. ConfigurationError from rules, waivers and rig.
+    """
+    rulebook = load_rulebook() if rulebook is None else rulebook
+    case = Case(recording)
+    findings = engine.run(case, rulebook, waivers=waivers, today=today)
+    diagnosis = _or(lambda: diagnose(case, case.evidence), _undiagnosed)
+    reconstruction = _repair(case, diagnosis)
+    changes: Mapping[str, Impact] = {}
+    if reconstruction is not None:
+        rebuilt = reconstruction
+        changes = _or(lambda: impact(case, rebuilt), lambda _: {})
+    return Audit(
+        recording=recording,
+        case=case,
+        rulebook=rulebook,
+        findings=findings,
+        diagnosis=diagnosis,
+        reconstruction=reconstruction,
+        impact=changes,
+        verdict=judge(findings),
+        tool=versions(),
+    )
+
+
+def judge(findings: Iterable[Finding]) -> AuditVerdict:
+    """FAIL when an error rule is violated; INCONCLUSIVE when one could not be decided or evaluated; else PASS."""
+    errors = [f.verdict for f in findings if f.severity is Severity.ERROR]
+    if Verdict.FAIL in errors:
+        return AuditVerdict.FAIL
+    if Verdict.INCONCLUSIVE in errors or Verdict.NOT_EVALUATED in errors:
+        return AuditVerdict.INCONCLUSIVE
+    return AuditVerdict.PASS
+
+
+def versions() -> dict[str, str]:
+    """Versions of nineaudit, Python, numpy and scipy, for the record."""
+    packages = {name: version(name) for name in ("nineaudit", "numpy", "scipy")}
+    return {"version": packages.pop("nineaudit"), "python": platform.python_version(), **packages}
+
+
+def _repair(case: Case, diagnosis: Diagnosis) -> Reconstruction | None:
+    if diagnosis.status is not Status.ISOLATED or len(diagnosis.channels) != 1:
+        return None
+    channel = diagnosis.channels[0]
+    return _or(lambda: rebuild_channel(case, channel, case.to_replace(channel)), lambda _: None)
+
+
+T = TypeVar("T")
+
+
+def _or(compute: Callable[[], T], otherwise: Callable[[EstimationError], T]) -> T:
+    """The value, or what stands for it where it cannot be estimated; findings carry the reason."""
+    try:
+        return compute()
+    except EstimationError as error:
+        return otherwise(error)
+
+
+def _undiagnosed(error: EstimationError) -> Diagnosis:
+    return Diagnosis(Status.UNDIAGNOSED, (), (), str(error))

@@ -1,0 +1,74 @@
+"""RB: do the channels fit one rigid body, within the error budget?
+
+A violated constraint says that *a* channel is wrong, not which: these measures name no channel. The diagnosis does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nineaudit.case import Case
+from nineaudit.estimate import closed_form, parity
+from nineaudit.finding import COVERAGE_FACTOR, Measure, NotApplicable
+
+AXES = ("ωyωz", "ωzωx", "ωxωy")
+
+
+def constraint_equations(case: Case, *, false_alarm: float) -> tuple[Measure, ...] | NotApplicable:
+    """RB301: the three constraint equations of the 3-2-2-2 array [Takhounts09 eq 14], one measure each.
+
+    r_x = (a2z − a0z)/2ry + (a3y − a0y)/2rz − ωyωz and so on. Each residual is put as an acceleration by twice the
+    geometric mean of its two arms, so that the number compares with the channels.
+    """
+    problem = case.nap_problem
+    if problem is None:
+        return NotApplicable("the array holds no ideal 3-2-2-2 layout; RB302 tests its general parity")
+    residual, noise, budget = closed_form.constraint_budget(problem)
+    factor = parity.budget_factor(false_alarm, residual.size)
+    found = []
+    for axis in range(3):
+        scale = 2.0 * np.sqrt(np.abs(np.prod(np.delete(problem.arms, axis))))
+        worst = int(np.argmax(np.abs(residual[:, axis]) / budget[:, axis]))
+        found.append(
+            Measure(
+                value=float(scale * abs(residual[worst, axis])),
+                limit=float(scale * (factor * budget[worst, axis] + COVERAGE_FACTOR * noise[axis])),
+                unit="m/s^2",
+                u=float(scale * noise[axis]),
+                interval=(float(problem.time[worst]), float(problem.time[worst])),
+                detail=f"constraint {AXES[axis]}",
+            )
+        )
+    return tuple(found)
+
+
+def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
+    """RB302: every channel against the least-squares fit of the whole array, (I − HH⁺)(y − q(ω)) [METHODS 2]."""
+    if sum(parity.redundancy(case.array)) == 0:
+        return NotApplicable(
+            f"the {len(case.array)} channels have no redundancy: "
+            "rigid-body constraints cannot show a fault in any of them"
+        )
+    worst = parity.worst(case.parity, false_alarm)
+    sensor = case.array.sensors[worst.column]
+    time = float(case.condensed.time[worst.row])
+    return Measure(
+        value=worst.value,
+        limit=worst.limit + COVERAGE_FACTOR * worst.noise,
+        unit="m/s^2" if sensor.kind == "accelerometer" else "rad/s",
+        u=worst.noise,
+        interval=(time, time),
+        detail=f"largest against its budget at {sensor.channel}, which need not be the culprit",
+    )
+
+
+def whole_record(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
+    """RB303: cost per degree of freedom of the constraints over the whole record, calibration errors fitted within
+    their priors [METHODS 2]. Small faults that no single sample shows add up here."""
+    if case.nap_problem is None:
+        return NotApplicable("the array holds no ideal 3-2-2-2 layout; RB302 tests its general parity")
+    healthy = case.nap_healthy
+    return Measure(healthy.statistic, closed_form.limit_per_dof(healthy.dof, false_alarm), "1")
+
+
+CHECKS = {"RB301": constraint_equations, "RB302": array_parity, "RB303": whole_record}

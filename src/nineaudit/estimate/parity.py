@@ -1,0 +1,151 @@
+"""Parity of a redundant array: what must vanish whatever the body does (METHODS.md 2).
+
+With N H = 0, the accelerometers give r_a = N (y − q(ω)), free of a0 and α; rate sensors beyond three axes give
+r_g = M y_g with M G = 0. For a 3-2-2-2 array r_a are the three constraint equations of Takhounts09 eq 14 in an
+orthonormal mixture. The residual of a channel is its share of the projection, e = Nᵀ r.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nineaudit.array import FloatArray, SensorArray
+from nineaudit.errors import EstimationError
+from nineaudit.estimate import calibration
+from nineaudit.estimate.motion import Motion, bridge, has_rates
+from nineaudit.physics import kinematics, rigid_body
+
+
+def redundancy(array: SensorArray) -> tuple[int, int]:
+    """Number of parity rows of the accelerometers and of the rate sensors, 0 where there is none.
+
+    Accelerometer parity needs ω: from rate sensors on three axes or from a product-free α.
+    """
+    accelerometers = array.is_accelerometer
+    rates = has_rates(array)
+    design = rigid_body.design(array.positions[accelerometers], array.axes[accelerometers])
+    spare = len(design) - int(np.linalg.matrix_rank(design, tol=1e-6)) if len(design) else 0
+    if spare and not rates:
+        try:
+            rigid_body.product_free_alpha(array.positions[accelerometers], array.axes[accelerometers])
+        except EstimationError:
+            spare = 0
+    return spare, int((~accelerometers).sum()) - 3 if rates else 0
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """Per channel: `value` (n,k) the disagreement, `noise` (k,) its standard deviation from noise alone, and
+    `budget` (n,k) its standard deviation from noise and calibration together; SI, NaN where not evaluated."""
+
+    value: FloatArray
+    noise: FloatArray
+    budget: FloatArray
+
+
+def channel_residuals(
+    array: SensorArray, time: FloatArray, readings: FloatArray, sigma: FloatArray, motion: Motion
+) -> Residual:
+    """Residual of every channel against the whole array, with its error budget.
+
+    `readings` (n,k) SI zeroed (NaN invalid), `sigma` (k,) noise, `motion` from the same readings. A sample with
+    an invalid channel is NaN in every channel it takes part with. Channels without redundancy are NaN.
+    """
+    accelerometers = np.flatnonzero(array.is_accelerometer)
+    gyros = np.flatnonzero(~array.is_accelerometer)
+    spare_a, spare_g = redundancy(array)
+    value = np.full(readings.shape, np.nan)
+    noise, variance = np.full(len(array), np.nan), np.zeros(readings.shape)
+    filled = bridge(readings, time)
+    patterns = calibration.all_columns(array, filled, time, motion)
+    if spare_a:
+        positions, axes = array.positions[accelerometers], array.axes[accelerometers]
+        projector = _projector(rigid_body.design(positions, axes))
+        y = readings[:, accelerometers] - rigid_body.centripetal(positions, axes, motion.omega)
+        value[:, accelerometers] = y @ projector.T
+        noise[accelerometers] = np.sqrt(projector**2 @ sigma[accelerometers] ** 2)
+        variance[:, accelerometers] = _accelerometer_budget(array, time, motion, patterns, projector, sigma)
+    if spare_g > 0:
+        projector = _projector(array.axes[gyros])
+        value[:, gyros] = readings[:, gyros] @ projector.T
+        noise[gyros] = np.sqrt(projector**2 @ sigma[gyros] ** 2)
+        variance[:, gyros] = np.einsum("ij,jnp->ni", projector**2, patterns[gyros] ** 2)
+    return Residual(value, noise, np.sqrt(variance + noise**2))
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The residual that exceeds its budget most: `column`, `row`, its size, its limit, its noise; SI."""
+
+    column: int
+    row: int
+    value: float
+    limit: float
+    noise: float
+
+
+def budget_factor(false_alarm: float, count: int) -> float:
+    """How many standard deviations `count` residuals of a healthy array exceed once in 1/`false_alarm` records."""
+    from scipy.special import ndtri
+
+    return float(-ndtri(false_alarm / (2.0 * max(count, 1))))
+
+
+def worst(residual: Residual, false_alarm: float) -> Worst:
+    """The worst residual and its limit for a false-alarm probability. EstimationError when there is none."""
+    ratio = np.abs(residual.value) / residual.budget
+    if not np.isfinite(ratio).any():
+        raise EstimationError("no sample has enough valid channels to test the array against itself")
+    row, column = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
+    factor = budget_factor(false_alarm, int(np.isfinite(ratio).sum()))
+    return Worst(
+        int(column),
+        int(row),
+        float(abs(residual.value[row, column])),
+        float(factor * residual.budget[row, column]),
+        float(residual.noise[column]),
+    )
+
+
+def _projector(design: FloatArray) -> FloatArray:
+    """I − H H⁺ (k,k), onto what no motion can explain."""
+    return np.eye(len(design)) - design @ np.linalg.pinv(design)
+
+
+def _accelerometer_budget(
+    array: SensorArray,
+    time: FloatArray,
+    motion: Motion,
+    patterns: FloatArray,
+    projector: FloatArray,
+    sigma: FloatArray,
+) -> FloatArray:
+    """(n,a) variance of the accelerometers' residuals from calibration errors and from the noise in ω.
+
+    δr = P (δy − ∂q/∂ω δω), with δω = G δy_g from rate sensors, or δω = ∫ L δy where ω is integrated.
+    """
+    accelerometers = np.flatnonzero(array.is_accelerometer)
+    positions, axes = array.positions[accelerometers], array.axes[accelerometers]
+    feed = np.einsum("ij,njc->nic", projector, rigid_body.centripetal_jacobian(positions, axes, motion.omega))
+    variance = np.zeros((len(time), len(accelerometers)))
+    rates = has_rates(array)
+    if rates:
+        gyros = np.flatnonzero(~array.is_accelerometer)
+        gain = np.linalg.pinv(array.axes[gyros] / sigma[gyros, None]) / sigma[gyros]
+        for j, g in enumerate(gyros):
+            through = feed @ gain[:, j]
+            variance += through**2 * ((patterns[g] ** 2).sum(axis=1) + sigma[g] ** 2)[:, None]
+        for j, a in enumerate(accelerometers):
+            variance += projector[:, j] ** 2 * (patterns[a] ** 2).sum(axis=1)[:, None]
+        return variance
+    combination = rigid_body.product_free_alpha(positions, axes)
+    step = np.gradient(time)
+    for j, a in enumerate(accelerometers):
+        through = feed @ combination[:, j]
+        turned = kinematics.integrate(patterns[a], time, np.zeros(patterns.shape[2]))
+        direct = projector[:, j][None, :, None] * patterns[a][:, None, :]
+        variance += ((direct - through[:, :, None] * turned[:, None, :]) ** 2).sum(axis=2)
+        variance += through**2 * (sigma[a] ** 2 * np.cumsum(step**2))[:, None]
+    return variance
