@@ -11,7 +11,7 @@ from nineaudit.errors import EstimationError
 from nineaudit.units import G0
 
 BRIC_CRITICAL: Final = (66.25, 56.45, 42.87)
-"""Critical ωx, ωy, ωz in rad/s [Takhounts et al. 2013, Stapp 57, Table 6]."""
+"""Critical ωx, ωy, ωz in rad/s [Takhounts et al. 2013, Stapp 57; METHODS.md 6]."""
 
 
 class Window(NamedTuple):
@@ -111,7 +111,7 @@ def _time_above(values: FloatArray, time: FloatArray, level: float) -> FloatArra
 def bric(omega: FloatArray, critical: tuple[float, float, float] = BRIC_CRITICAL) -> float:
     """Brain injury criterion √Σ(max|ω_i|/ω_i,crit)² of `omega` (n,3) rad/s in the head frame (SAE J1733).
 
-    The three maxima are taken separately [Takhounts et al. 2013 eq 1]. Raises EstimationError for gaps.
+    The three maxima are taken separately [Takhounts et al. 2013; METHODS.md 6]. EstimationError for gaps.
     """
     if omega.size == 0 or not np.isfinite(omega).all():
         raise EstimationError("angular velocity is empty or has gaps", advice="repair the channel first")
