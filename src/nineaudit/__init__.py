@@ -3,7 +3,7 @@
 Reading order: array.py (what an instrument is), physics/rigid_body.py (what it must read), physics/nap.py (the nine
 accelerometers of the 3-2-2-2 layout), estimate/calibration.py (what small errors do), estimate/parity.py and
 estimate/closed_form.py (what must vanish, and leave-one-out), case.py, checks/, diagnose.py, reconstruct.py,
-audit.py; then readers/ and report/ at the two ends.
+auditing.py; then readers/ and report/ at the two ends.
 
 Frames. Everything is in the body frame: origin and axes are those in which the rig file gives positions and axes;
 SAE J1733 (x forward, y right, z down) for a head. Rotations and rates are right-handed.
@@ -36,35 +36,31 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nineaudit.audit import Audit, AuditVerdict, audit
+    from nineaudit.auditing import Audit, AuditVerdict, audit
     from nineaudit.errors import ConfigurationError, EstimationError, NineauditError, RecordingError
     from nineaudit.finding import Finding, Measure, Severity, Verdict
     from nineaudit.readers import read
     from nineaudit.recording import Recording
-    from nineaudit.repair import repair
     from nineaudit.report import write_report
     from nineaudit.rig import Rig, load_rig
     from nineaudit.rulebook import load_rulebook
-    from nineaudit.simulate import simulate
 
 _HOMES = {
-    "nineaudit.audit": ("Audit", "AuditVerdict", "audit"),
+    "nineaudit.auditing": ("Audit", "AuditVerdict", "audit"),
     "nineaudit.errors": ("ConfigurationError", "EstimationError", "NineauditError", "RecordingError"),
     "nineaudit.finding": ("Finding", "Measure", "Severity", "Verdict"),
     "nineaudit.readers": ("read",),
     "nineaudit.recording": ("Recording",),
-    "nineaudit.repair": ("repair",),
     "nineaudit.report": ("write_report",),
     "nineaudit.rig": ("Rig", "load_rig"),
     "nineaudit.rulebook": ("load_rulebook",),
-    "nineaudit.simulate": ("simulate",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Audit", "AuditVerdict", "ConfigurationError", "EstimationError", "Finding", "Measure", "NineauditError",
     "Recording", "RecordingError", "Rig", "Severity", "Verdict", "audit", "load_rig", "load_rulebook", "read",
-    "repair", "simulate", "write_report",
+    "write_report",
 ]  # fmt: skip
 
 
