@@ -1,0 +1,207 @@
+"""Audit -> the HTML report: one file, offline, complete without script, the same bytes for the same audit."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import tempfile
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nineaudit.finding import Verdict
+from nineaudit.report import origin, tables
+from nineaudit.report.figures import (
+    Figure,
+    constraint_figures,
+    gallery,
+    motion_figures,
+    reconstruction_figures,
+)
+from nineaudit.report.findings import NOTABLE, WEIGHT, by_rule, channels
+from nineaudit.report.numbers import (
+    digits,
+    edge,
+    printable,
+    probability,
+    quantity,
+    sensor_edge,
+    spelled,
+)
+from nineaudit.report.text import diagnosis_sentence, fault_word, joined
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+    from nineaudit.auditing import Audit
+    from nineaudit.diagnose import Diagnosis
+
+MARKS = {
+    Verdict.PASS: "✓",
+    Verdict.FAIL: "✕",
+    Verdict.WARN: "!",
+    Verdict.INCONCLUSIVE: "?",
+    Verdict.WAIVED: "~",
+    Verdict.NOT_APPLICABLE: "·",
+    Verdict.NOT_EVALUATED: "?",
+}
+"""A sign beside every verdict's word, so that neither colour nor sign alone has to carry it."""
+
+_LEAD = {
+    "pass": "The recording passes every rule that applies to it.",
+    "fail": "The recording breaks at least one rule of severity error.",
+    "inconclusive": "The recording can neither be passed nor failed within the measurement uncertainty.",
+    "not_audited": "The recording could not be audited. That is not a pass.",
+}
+
+
+def write_report(audit: Audit, path: str | Path) -> Path:
+    """Write the report of `audit` to `path`, whole or not at all. OSError where the place cannot be written."""
+    path = Path(path)
+    data = render(audit).encode("utf-8")
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    part = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        part.chmod(0o644)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+def render(audit: Audit) -> str:
+    """The report as a string of HTML."""
+    return _template().render(context(audit)) + "\n"
+
+
+@cache
+def _template() -> Template:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("nineaudit.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: value if isinstance(value, Markup) else printable(value),
+    )
+    environment.filters["drawn"] = _drawn
+    return environment.get_template("report.html.j2")
+
+
+def _drawn(figure: Figure) -> Any:
+    """The SVG of a figure, which svg.py has escaped, as safe markup."""
+    from markupsafe import Markup
+
+    return Markup(figure.svg)
+
+
+def context(audit: Audit) -> dict[str, Any]:
+    """Everything that the template shows, as finished strings, lists of them, and figures."""
+    from markupsafe import Markup
+
+    css = files("nineaudit.report").joinpath("templates/report.css").read_text(encoding="utf-8")
+    style = "\n" + css
+    digest = base64.b64encode(hashlib.sha256(style.encode("utf-8")).digest()).decode("ascii")
+    return {
+        "css": Markup(style),
+        "csp": f"default-src 'none'; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'",
+        "marks": {str(verdict): mark for verdict, mark in MARKS.items()},
+        "name": audit.recording.source.path.name,
+        "banner": banner(audit),
+        "identity": origin.identity(audit),
+        "diagnosis": audit.diagnosis,
+        "candidates": tables.candidates(audit),
+        "sensitivity": tables.sensitivity(audit),
+        "impact": tables.impact(audit),
+        "rebuilt": rebuilt(audit),
+        "families": tables.rule_families(audit),
+        "tally": tally(audit),
+        "constraints": constraint_figures(audit),
+        "motion": motion_figures(audit),
+        "gallery": gallery(audit, audit.diagnosis.channels),
+        "rig": rig(audit),
+        "provenance": origin.provenance(audit),
+    }
+
+
+def banner(audit: Audit) -> dict[str, Any]:
+    """The verdict, who is at fault, how sure that is, and who would be next."""
+    diagnosis, verdict = audit.diagnosis, str(audit.verdict)
+    others = [c for c in diagnosis.candidates if not set(c.channels) & set(diagnosis.channels)]
+    rival = others[0] if others else None
+    return {
+        "verdict": verdict,
+        "label": verdict.replace("_", " "),
+        "lead": _LEAD[verdict],
+        "power": tables.power(audit) if str(diagnosis.status) == "healthy" else "",
+        "sentence": headline(diagnosis),
+        "next": (
+            f"{joined(rival.channels)} ({fault_word(rival.fault)}), probability {probability(rival.probability)}"
+            if rival and diagnosis.channels
+            else ""
+        ),
+        "broken": [
+            {"code": g.rule, "verdict": str(g.verdict), "channels": _channels(g)}
+            for g in sorted(by_rule(audit.findings), key=lambda g: WEIGHT.index(g.verdict))
+            if g.verdict in NOTABLE
+        ],
+    }
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """The diagnosis as a sentence that starts with a capital, which a channel's name may not."""
+    sentence = diagnosis_sentence(diagnosis)
+    if str(diagnosis.status) == "isolated":
+        return f"{'Channels' if len(diagnosis.channels) > 1 else 'Channel'} {sentence}."
+    return f"{sentence[0].upper()}{sentence[1:]}."
+
+
+def _channels(group: Any) -> str:
+    """The channels that share the worst verdict of a rule; of many, how many."""
+    named = dict.fromkeys(c for f in group.findings if f.verdict is group.verdict for c in channels(f))
+    return f"{len(named)} channels" if len(named) > 3 else ", ".join(named)
+
+
+def tally(audit: Audit) -> list[tuple[str, str, int]]:
+    """(verdict, label, number of rules) for every verdict that occurs, by each rule's worst finding."""
+    verdicts = [g.verdict for g in by_rule(audit.findings)]
+    return [(str(v), v.replace("_", " "), verdicts.count(v)) for v in Verdict if v in verdicts]
+
+
+def rebuilt(audit: Audit) -> dict[str, Any] | None:
+    """What was replaced, how, from what, and how well it is known."""
+    new = audit.reconstruction
+    if new is None:
+        return None
+    rig = audit.recording.rig
+    unit, one = sensor_edge(rig.array[new.channels[0]], rig)
+    replaced = int(new.replaced.sum())
+    facts = [
+        ("Channel", joined(new.channels)),
+        ("Interval", tables.interval(new.interval)),
+        ("Samples replaced", f"{replaced} of {new.replaced.size}"),
+        ("Method", new.method),
+        ("Rebuilt from", ", ".join(new.donors)),
+        ("Standard uncertainty u (rms)", quantity(float(new.u_rms) / one, unit, 2)),
+        ("u against the Cramér–Rao bound", f"{digits(new.bound_ratio)} times"),
+    ]
+    return {"facts": facts, "figures": reconstruction_figures(audit)}
+
+
+def rig(audit: Audit) -> dict[str, Any]:
+    """The rig's table and its units."""
+    value = audit.recording.rig
+    unit, metre = edge("m", value)
+    return {
+        "name": value.name,
+        "length": spelled(unit),
+        "sensors": tables.sensors(audit),
+        "points": [(p.name, [digits(float(v) / metre) for v in p.position]) for p in value.points],
+    }
