@@ -36,6 +36,9 @@ class AuditVerdict(StrEnum):
     NOT_AUDITED = "not_audited"
 
 
+T = TypeVar("T")
+
+
 @dataclass(frozen=True, eq=False)
 class Audit:
     """`findings` of every rule, the `diagnosis`, the `reconstruction` where a channel was rebuilt, its `impact`
@@ -79,7 +82,9 @@ class Audit:
             return None
         columns, arms = self.case.nap_layout
         index = list(columns)
-        full = nap.constraint_residuals(bridge(self.case.readings[:, index], self.case.time), arms, self.case.time)
+        full = nap.constraint_residuals(
+            bridge(self.case.readings[:, index], self.case.time), arms, self.case.time
+        )
         _, noise, budget = closed_form.constraint_budget(problem)
         rows = nap.product_rows(arms) ** 2 @ self.case.sigma[index] ** 2
         time, calibration = self.case.time, np.maximum(budget**2 - noise**2, 0.0)
@@ -101,7 +106,7 @@ def audit(
     rulebook = load_rulebook() if rulebook is None else rulebook
     case = Case(recording)
     findings = engine.run(case, rulebook, waivers=waivers, today=today)
-    diagnosis = _or(lambda: diagnose(case, case.evidence), _undiagnosed)
+    diagnosis = _or(lambda: diagnose(case, _words(case)), _undiagnosed)
     reconstruction = _repair(case, diagnosis)
     changes: Mapping[str, Impact] = {}
     if reconstruction is not None:
@@ -136,14 +141,27 @@ def versions() -> dict[str, str]:
     return {"version": packages.pop("nineaudit"), "python": platform.python_version(), **packages}
 
 
+def _words(case: Case) -> dict[str, str]:
+    """Channel -> fault word, where its own trace shows one."""
+    return {found.channel: found.fault for found in case.evidence if found.fault is not None}
+
+
 def _repair(case: Case, diagnosis: Diagnosis) -> Reconstruction | None:
     if diagnosis.status is not Status.ISOLATED or len(diagnosis.channels) != 1:
         return None
-    channel = diagnosis.channels[0]
-    return _or(lambda: rebuild_channel(case, channel, case.to_replace(channel)), lambda _: None)
+    return _or(lambda: mend(case, diagnosis.channels[0]), lambda _: None)
 
 
-T = TypeVar("T")
+def mend(case: Case, channel: str) -> Reconstruction:
+    """Rebuild a channel where its own trace shows it wrong (a clipped top, a dropout) and keep the rest as it was
+    measured, if that makes the record whole; else rebuild all of it. EstimationError as rebuild_channel."""
+    seen = case.flagged[:, case.array.index(channel)]
+    if seen.any():
+        partly = rebuild_channel(case, channel, seen)
+        healthy = case.with_readings([channel], partly.repaired).nap_healthy
+        if healthy.statistic <= closed_form.limit_per_dof(healthy.dof):
+            return partly
+    return rebuild_channel(case, channel)
 
 
 def _or(compute: Callable[[], T], otherwise: Callable[[EstimationError], T]) -> T:

@@ -6,6 +6,7 @@ that the accelerometers see there goes with it, which the constraints do not fee
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,6 +17,7 @@ from nineaudit.errors import EstimationError
 from nineaudit.estimate import budget, closed_form, condense, parity
 from nineaudit.estimate.motion import Motion, bridge, estimate_motion
 from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
+from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
 from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
 from nineaudit.physics import nap
 from nineaudit.recording import Recording
@@ -105,9 +107,21 @@ class Case:
         return find_evidence(self.recording, self.sigma)
 
     @cached_property
+    def evidence(self) -> tuple[ChannelEvidence, ...]:
+        """What each channel's own trace shows: flat tops, dropouts, stuck stretches, spikes."""
+        return find_evidence(self.recording, self.sigma)
+
+    @cached_property
     def flagged(self) -> BoolArray:
-        """(n,k) samples that their own trace shows to be wrong: flat tops, dropouts, stuck stretches, spikes."""
+        """(n,k) samples of the common time base that the evidence speaks of."""
         return flagged(self.recording, self.evidence)
+
+    def with_readings(self, channels: Sequence[str], readings: FloatArray) -> Case:
+        """The same recording with other readings (n,m) SI, zero taken off, in some channels."""
+        columns = [self.array.index(c) for c in channels]
+        changed = self.recording.readings.copy()
+        changed[:, columns] = readings + self.zero[columns]
+        return Case(replace(self.recording, readings=changed, valid=np.isfinite(changed)))
 
     @property
     def trusted(self) -> FloatArray:

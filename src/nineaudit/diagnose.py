@@ -95,7 +95,9 @@ def _of_closed_forms(fit: ClosedFormFit, evidence: Mapping[str, str]) -> Diagnos
         "limit": limit,
     }
     if healthy <= limit:
-        reason = f"the constraints hold within the budget: {healthy:.2f} per degree of freedom, limit {limit:.2f}"
+        reason = (
+            f"the constraints hold within the budget: {healthy:.2f} per degree of freedom, limit {limit:.2f}"
+        )
         return Diagnosis(Status.HEALTHY, (), (), reason, **shared)
     candidates = _candidates(fit, evidence)
     holding = [k for k in range(9) if fit.free[k].statistic <= closed_form.limit_per_dof(fit.free[k].dof)]
@@ -166,7 +168,9 @@ def _candidates(fit: ClosedFormFit, evidence: Mapping[str, str]) -> tuple[Candid
     weight /= weight.sum()
     order = np.argsort(-score, kind="stable")
     return tuple(
-        Candidate((fit.names[k],), evidence.get(fit.names[k], "unknown"), float(weight[k]), fit.free[k].statistic)
+        Candidate(
+            (fit.names[k],), evidence.get(fit.names[k], "unknown"), float(weight[k]), fit.free[k].statistic
+        )
         for k in order
     )
 

@@ -30,7 +30,13 @@ class Impact:
 
 
 UNITS = {"peak α": "rad/s^2", "peak ω": "rad/s", "BrIC": "1"}
-_POINT_UNITS = {"peak a": "g_0", "HIC15": "g_0^2.5 s", "HIC36": "g_0^2.5 s", "GSI": "g_0^2.5 s", "a3ms": "g_0"}
+_POINT_UNITS = {
+    "peak a": "g_0",
+    "HIC15": "g_0^2.5 s",
+    "HIC36": "g_0^2.5 s",
+    "GSI": "g_0^2.5 s",
+    "a3ms": "g_0",
+}
 
 
 def reported(case: Case, time: FloatArray, motion: Motion) -> dict[str, float]:
@@ -91,4 +97,3 @@ def _scatter(case: Case, fixed: FloatArray, repair: Reconstruction) -> dict[str,
         drawn += case.sigma / np.sqrt(step) * rng.standard_normal(readings.shape)
         draws.append(reported(case, time, estimate_motion(case.array, time, drawn, case.sigma, start)))
     return {name: float(np.std([d[name] for d in draws], ddof=1)) for name in draws[0]}
-

@@ -101,7 +101,9 @@ def _uncertainty(
     for i, sensor in enumerate(nine.sensors):
         if i == missing:
             continue
-        columns = calibration.columns(sensor, readings[:, i], case.time, motion) * calibration.prior_sd(sensor)
+        columns = calibration.columns(sensor, readings[:, i], case.time, motion) * calibration.prior_sd(
+            sensor
+        )
         for pattern in columns.T[np.any(columns, axis=0)]:
             step = np.zeros_like(readings)
             step[:, i] = pattern

@@ -13,7 +13,7 @@ import numpy as np
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import calibration
-from nineaudit.estimate.motion import Motion, bridge, has_rates
+from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, has_rates
 from nineaudit.physics import rigid_body
 
 SOURCES = ("gain", "zero", "alignment", "position", "timing", "noise")
@@ -47,7 +47,7 @@ def alpha_combination(array: SensorArray) -> FloatArray:
     design = rigid_body.design(positions, axes)
     if has_rates(array) and len(design) and np.linalg.matrix_rank(design, tol=1e-6) == 6:
         return np.asarray(np.linalg.pinv(design)[3:])
-    return rigid_body.product_free_alpha(positions, axes)
+    return rigid_body.product_free_alpha(positions, axes, leak=OFF_IDEAL)
 
 
 def alpha_budget(
@@ -57,10 +57,14 @@ def alpha_budget(
     combination = alpha_combination(array)
     size = np.linalg.norm(motion.alpha, axis=1)
     row = int(np.argmax(size))
-    patterns = calibration.all_columns(array, bridge(readings, time), time, motion)[array.is_accelerometer, row]
+    patterns = calibration.all_columns(array, bridge(readings, time), time, motion)[
+        array.is_accelerometer, row
+    ]
     reach = (combination**2).sum(axis=0)
     parts = {
-        source: float(np.sqrt(sum(reach @ patterns[:, calibration.PARAMETERS.index(m)] ** 2 for m in members)))
+        source: float(
+            np.sqrt(sum(reach @ patterns[:, calibration.PARAMETERS.index(m)] ** 2 for m in members))
+        )
         for source, members in _MEMBERS.items()
     }
     parts["noise"] = float(np.sqrt(reach @ sigma[array.is_accelerometer] ** 2))

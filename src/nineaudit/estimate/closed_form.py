@@ -21,6 +21,7 @@ from nineaudit.estimate import calibration
 from nineaudit.estimate.motion import Motion
 from nineaudit.physics import kinematics, nap
 
+
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """`channel` (column of the nine; None: healthy) is free: its `cost` and `dof`, with the whitening `whiten`
@@ -57,7 +58,12 @@ class Problem:
 
 
 def make_problem(
-    nine: SensorArray, time: FloatArray, readings: FloatArray, sigma: FloatArray, motion: Motion, arms: FloatArray
+    nine: SensorArray,
+    time: FloatArray,
+    readings: FloatArray,
+    sigma: FloatArray,
+    motion: Motion,
+    arms: FloatArray,
 ) -> Problem:
     """`nine` sensors and their columns in the order of nap.CHANNELS; `readings` without gaps."""
     patterns = calibration.all_columns(nine, readings, time, motion)

@@ -13,6 +13,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 
+
 @dataclass(frozen=True, eq=False)
 class Condensed:
     """Block means: `time` (m,), `readings` (m,k) NaN where a block has no valid sample, `sigma` (k,) noise of a

@@ -16,6 +16,9 @@ from nineaudit.array import BoolArray, FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.physics import kinematics, rigid_body
 
+OFF_IDEAL = 0.05
+"""Largest part of the products of ω that may leak into α: seismic masses sit some mm off the ideal points."""
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -82,7 +85,7 @@ def estimate_motion(
         valid = np.isfinite(readings[:, gyros])
         omega = bridge(rates_omega(array.axes[gyros], readings[:, gyros], sigma[gyros], valid), time)
         return _with_accelerations(omega, positions, axes, readings[:, accelerometers], time)
-    combination = rigid_body.product_free_alpha(positions, axes)
+    combination = rigid_body.product_free_alpha(positions, axes, leak=OFF_IDEAL)
     if rest_index is None:
         raise EstimationError(
             "ω at the start is not known", advice="state [recording] pre_trigger with the body at rest"
@@ -103,12 +106,14 @@ def _with_accelerations(
     if rank == 6:
         y = bridge(readings, time) - rigid_body.centripetal(positions, axes, omega)
         solved = y @ np.linalg.pinv(design).T
-        return Motion(omega, solved[:, 3:], solved[:, :3], "rate sensors; α by least squares of the accelerometers")
+        return Motion(
+            omega, solved[:, 3:], solved[:, :3], "rate sensors; α by least squares of the accelerometers"
+        )
     alpha = kinematics.differentiate(omega, time)
     a0 = np.full_like(omega, np.nan)
     if len(axes) and np.linalg.matrix_rank(axes, tol=1e-3) == 3:
-        moved = np.einsum("ki,nki->nk", axes, np.cross(alpha[:, None, :], positions)) + rigid_body.centripetal(
-            positions, axes, omega
-        )
+        moved = np.einsum(
+            "ki,nki->nk", axes, np.cross(alpha[:, None, :], positions)
+        ) + rigid_body.centripetal(positions, axes, omega)
         a0 = (bridge(readings, time) - moved) @ np.linalg.pinv(axes).T
     return Motion(omega, alpha, a0, "rate sensors; α by differentiation")

@@ -14,25 +14,16 @@ import numpy as np
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import calibration
-from nineaudit.estimate.motion import Motion, bridge, has_rates
+from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, has_rates
 from nineaudit.physics import kinematics, rigid_body
 
 
 def redundancy(array: SensorArray) -> tuple[int, int]:
-    """Number of parity rows of the accelerometers and of the rate sensors, 0 where there is none.
-
-    Accelerometer parity needs ω: from rate sensors on three axes or from a product-free α.
-    """
+    """Number of parity rows of the accelerometers and of the rate sensors; (0, 0): nothing can be tested."""
     accelerometers = array.is_accelerometer
-    rates = has_rates(array)
     design = rigid_body.design(array.positions[accelerometers], array.axes[accelerometers])
-    spare = len(design) - int(np.linalg.matrix_rank(design, tol=1e-6)) if len(design) else 0
-    if spare and not rates:
-        try:
-            rigid_body.product_free_alpha(array.positions[accelerometers], array.axes[accelerometers])
-        except EstimationError:
-            spare = 0
-    return spare, int((~accelerometers).sum()) - 3 if rates else 0
+    spare = len(rigid_body.parity(design)) if len(design) else 0
+    return spare, int((~accelerometers).sum()) - 3 if has_rates(array) else 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +131,7 @@ def _accelerometer_budget(
         for j, a in enumerate(accelerometers):
             variance += projector[:, j] ** 2 * (patterns[a] ** 2).sum(axis=1)[:, None]
         return variance
-    combination = rigid_body.product_free_alpha(positions, axes)
+    combination = rigid_body.product_free_alpha(positions, axes, leak=OFF_IDEAL)
     step = np.gradient(time)
     for j, a in enumerate(accelerometers):
         through = feed @ combination[:, j]

@@ -64,7 +64,9 @@ def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray) -> Quie
     allowed = np.where(np.isfinite(noise[alive]), 3.0 * noise[alive], 0.02 * overall)
     allowed = np.where(allowed > 0, allowed, np.inf)
     starts = np.arange(0, readings.shape[0] - length + 1, max(1, length // 4))
-    scatter = _windowed_sd(np.nan_to_num(readings[:, alive] - np.nanmean(readings[:, alive], axis=0)), starts, length)
+    scatter = _windowed_sd(
+        np.nan_to_num(readings[:, alive] - np.nanmean(readings[:, alive], axis=0)), starts, length
+    )
     # the median channel chooses, so that one noisy channel cannot hide the rest of the array's rest
     badness = np.median(scatter / allowed, axis=1)
     best = int(np.argmin(badness))
