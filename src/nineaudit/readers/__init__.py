@@ -1,1 +1,136 @@
+"""From a file to a Recording: a reader for each kind of file, then assemble.
 
+A reader is a function ``(path, rig) -> Contents``: the rig's signals as recorded, each with its own clock, and what
+the container held. It holds no physics; what it drops it counts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from nineaudit.errors import RecordingError
+from nineaudit.readers.assemble import assemble
+from nineaudit.readers.can_log import read_can
+from nineaudit.readers.contents import Contents
+from nineaudit.readers.csv_table import read_text_table
+from nineaudit.readers.mcap_log import read_mcap
+from nineaudit.readers.parquet_table import read_parquet
+from nineaudit.recording import Recording, Source
+from nineaudit.signals import suggestion
+
+if TYPE_CHECKING:
+    from nineaudit.rig import Rig
+
+__all__ = ["READERS", "Contents", "Reader", "assemble", "read"]
+
+Reader = Callable[[Path, "Rig"], Contents]
+
+_CAN_CSV: Final = b"timestamp,arbitration_id,extended,remote,error,dlc,data"
+_MAGIC: Final = {
+    b"LOGG": (".blf", "a BLF log"),
+    b"\x89MCAP0\r\n": (".mcap", "an MCAP log"),
+    b"MDF     ": (".mf4", "an MDF file"),
+    b"UnFinMF ": (".mf4", "an MDF file"),
+    b"PAR1": (".parquet", "a Parquet table"),
+    b"PK\x03\x04": ("", "a ZIP archive (or a spreadsheet)"),
+    b"\x1f\x8b": ("", "a gzip archive"),
+    b"%PDF": ("", "a PDF document"),
+    b"\x89PNG": ("", "a PNG picture"),
+    b"\x89HDF": ("", "an HDF5 file"),
+    b"SQLite format 3": ("", "an SQLite database"),
+}
+_BINARY: Final = (".blf", ".mcap", ".mf4", ".parquet")
+
+
+def _read_csv(path: Path, rig: Rig) -> Contents:
+    """A table, or python-can's own CSV log, which its header gives away."""
+    with path.open("rb") as file:
+        head = file.read(len(_CAN_CSV) + 3).removeprefix(b"\xef\xbb\xbf")
+    return (read_can if head.startswith(_CAN_CSV) else read_text_table)(path, rig)
+
+
+READERS: Final[Mapping[str, Reader]] = {
+    ".csv": _read_csv,
+    ".tsv": read_text_table,
+    ".txt": read_text_table,
+    ".parquet": read_parquet,
+    ".blf": read_can,
+    ".asc": read_can,
+    ".log": read_can,
+    ".trc": read_can,
+    ".mf4": read_can,
+    ".mcap": read_mcap,
+}
+"""Reader of each suffix (lower case)."""
+
+
+def read(path: str | Path, rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recording:
+    """Read a recording of a rig: (n,) s and (n,k) SI readings on one time base, and the traces as recorded.
+
+    `dbc` takes the place of the rig's CAN databases. Raises RecordingError (exit code 3) for a file that cannot be
+    read, is truncated, or lacks a channel; ConfigurationError (2) for databases and units.
+    """
+    path = Path(path)
+    rig = replace(rig, dbc=tuple(Path(p) for p in dbc)) if dbc else rig
+    reader = _reader(path)
+    try:
+        size, sha256 = path.stat().st_size, _sha256(path)
+        _require_kind(path, size)
+        contents = reader(path, rig)
+        unchanged = _sha256(path) == sha256
+    except OSError as error:
+        raise RecordingError(f"cannot be read: {error.strerror or error}", file=path) from error
+    source = Source(
+        path=path,
+        format=path.suffix.lower().removeprefix("."),
+        sha256=sha256,
+        size=size,
+        unchanged_after_read=unchanged,
+        counts=contents.counts,
+        notes=contents.notes,
+    )
+    return assemble(contents, rig, source)
+
+
+def _reader(path: Path) -> Reader:
+    if path.is_dir():
+        raise RecordingError("is a folder, not a recording", file=path, advice="name the files in it")
+    suffix = path.suffix.lower()
+    if suffix not in READERS:
+        raise RecordingError(
+            "unknown kind of file",
+            file=path,
+            found=path.suffix or "no suffix",
+            expected="one of " + " ".join(READERS),
+            advice=suggestion(suffix, READERS) if suffix else None,
+        )
+    return READERS[suffix]
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _require_kind(path: Path, size: int) -> None:
+    """The first bytes must be of the kind that the suffix says."""
+    if size == 0:
+        raise RecordingError("the file is empty", file=path)
+    suffix = path.suffix.lower()
+    with path.open("rb") as file:
+        head = file.read(16)
+    found = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
+    if (found is None and suffix not in _BINARY) or (found and found[0] == suffix):
+        return
+    raise RecordingError(
+        f"the content is not what the suffix {suffix} says",
+        file=path,
+        place="byte 0",
+        found=found[1] if found else head[:8],
+        expected=next((kind for end, kind in _MAGIC.values() if end == suffix), "text"),
+        advice=f"rename it to {found[0]}" if found and found[0] else None,
+    )

@@ -1,0 +1,38 @@
+"""What a reader hands to assemble, and the sentence for a file that cannot be read to its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nineaudit.errors import RecordingError
+from nineaudit.recording import Trace
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Signals of a file, one a channel, as recorded; what its container held; and what there is to say about it."""
+
+    traces: tuple[Trace, ...]
+    counts: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def cut_short(path: Path, why: str, what_was_read: str, *, place: str | None = None) -> RecordingError:
+    """The error for a truncated or damaged file: it says what could be read, and nothing of it is used."""
+    return RecordingError(
+        f"the file is cut short or damaged: {why}",
+        file=path,
+        place=place,
+        advice=f"{what_was_read} could be read; record or copy the file again",
+    )
+
+
+def span(count: int, noun: str, first: float, last: float) -> str:
+    """ "53800 frames, 0 s to 60 s" for what could be read before the damage."""
+    if count == 0:
+        return f"no {noun}s"
+    origin = first if first > 1e6 else 0.0
+    stamps = f"{first - origin:.6g} s to {last - origin:.6g} s"
+    return f"{count} {noun}{'s' if count != 1 else ''} ({stamps}{' after the first' if origin else ''})"

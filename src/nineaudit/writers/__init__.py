@@ -1,0 +1,109 @@
+"""From a Recording to a file that reads back as the same recording: the rig's units and signal names.
+
+A file appears whole or not at all, never in the place of another unless that is asked for, and never in the place
+of the recording it comes from.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from nineaudit.array import FloatArray
+from nineaudit.errors import ConfigurationError
+from nineaudit.recording import Recording
+from nineaudit.signals import suggestion
+from nineaudit.writers.can_file import write_asc, write_blf
+from nineaudit.writers.dbc import make_dbc
+from nineaudit.writers.mcap_file import write_mcap
+from nineaudit.writers.outcome import Outcome
+from nineaudit.writers.table_file import write_csv, write_parquet
+
+__all__ = ["WRITERS", "Written", "make_dbc", "write_recording"]
+
+Writer = Callable[[Recording, FloatArray, Path, Sequence[Path]], Outcome]
+"""(recording, (n,k) SI readings, file, databases) -> what became of the numbers."""
+
+WRITERS: Final[Mapping[str, Writer]] = {
+    ".csv": write_csv,
+    ".tsv": write_csv,
+    ".txt": write_csv,
+    ".parquet": write_parquet,
+    ".mcap": write_mcap,
+    ".blf": write_blf,
+    ".asc": write_asc,
+}
+"""Writer of each suffix (lower case)."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written. `error`: by channel, the largest difference (SI) that the format made; `notes` in words."""
+
+    path: Path
+    error: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def write_recording(
+    recording: Recording,
+    path: str | Path,
+    *,
+    dbc: str | Path | Sequence[str | Path] | None = None,
+    readings: FloatArray | None = None,
+    force: bool = False,
+) -> Written:
+    """Write a recording in the format of the path's suffix; ``read(path, rig)`` gives it back.
+
+    `readings` (n,k) SI are written in place of the recording's (a repair). `dbc` for CAN formats, else the rig's.
+    CSV, Parquet and MCAP keep every digit; CAN keeps what the database resolves, and `Written.error` says how much
+    that is. Raises ConfigurationError: unknown suffix, the file exists (unless `force`) or is the recording's own
+    source, a folder that is not there, values that a CAN signal cannot hold.
+    """
+    path = Path(path)
+    writer = _writer(path)
+    _require_free(path, recording.source.path, force)
+    values = recording.readings if readings is None else np.asarray(readings, dtype=np.float64)
+    if values.shape != recording.readings.shape:
+        raise ValueError(f"readings {values.shape} for a recording of {recording.readings.shape}")
+    databases = recording.rig.dbc if dbc is None else [dbc] if isinstance(dbc, (str, Path)) else dbc
+    partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        outcome = writer(recording, values, partial, [Path(p) for p in databases])
+        os.replace(partial, path)
+    except OSError as error:
+        raise ConfigurationError(f"cannot be written: {error.strerror or error}", file=path) from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return Written(path, outcome.error, outcome.notes)
+
+
+def _writer(path: Path) -> Writer:
+    suffix = path.suffix.lower()
+    if suffix not in WRITERS:
+        raise ConfigurationError(
+            "no format to write",
+            file=path,
+            found=path.suffix or "no suffix",
+            expected="one of " + " ".join(WRITERS),
+            advice=suggestion(suffix, WRITERS) if suffix else None,
+        )
+    return WRITERS[suffix]
+
+
+def _require_free(path: Path, source: Path, force: bool) -> None:
+    if path.is_dir() or not path.parent.is_dir():
+        what = "is a folder" if path.is_dir() else "the folder for it does not exist"
+        raise ConfigurationError(what, file=path, expected="a file in a folder that exists")
+    same = source.exists() and path.exists() and path.samefile(source)
+    if same or path.absolute() == source.absolute():
+        raise ConfigurationError(
+            "the original recording is never overwritten", file=path, advice="choose another name for the output"
+        )
+    if path.exists() and not force:
+        raise ConfigurationError("the file exists already", file=path, advice="choose another name")
