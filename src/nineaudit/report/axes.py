@@ -8,12 +8,17 @@ from nineaudit.array import FloatArray
 
 
 def ticks(low: float, high: float, about: int) -> list[float]:
-    """Round numbers (1, 2, 5 times a power of ten) between `low` and `high`, about so many."""
+    """Round numbers (1, 2, 5 times a power of ten) between `low` and `high`, `about` so many, at least three."""
     raw = (high - low) / max(about, 1)
     if raw <= 0.0:
         return [low]
     power = 10.0 ** math.floor(math.log10(raw))
-    step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= raw * (1 - 1e-9))
+    steps = [m * power for m in (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)]
+    chosen = [_multiples(low, high, step) for step in steps if step <= 2.5 * raw]
+    return next((found for found in reversed(chosen) if len(found) >= 3), chosen[0])
+
+
+def _multiples(low: float, high: float, step: float) -> list[float]:
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [k * step for k in range(first, last + 1)]
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.finding import COVERAGE_FACTOR
+from nineaudit.report.chart import Band, Chart, Flags, Level, Line
 from nineaudit.report.numbers import digits, edge, quantity, sensor_edge, spelled
-from nineaudit.report.svg import Band, Chart, Flags, Level, Line, draw
+from nineaudit.report.svg import draw
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -64,17 +65,15 @@ def _rebuilt_channel(audit: Audit, rebuilt: Reconstruction, m: int) -> list[Figu
     whole = Chart(
         key=f"rebuilt-{m}",
         title=f"{name}: measured and rebuilt",
-        description=f"Peak measured {_peak(measured, unit)}, rebuilt {_peak(new, unit)}; replaced interval shaded.",
+        description=f"Peak measured {_peak(measured, unit)}, rebuilt {_peak(new, unit)}; replaced samples shaded.",
         time=time,
         unit=spelled(unit),
         lines=(Line(new, "rebuilt", "rebuilt"), Line(measured, "measured", "measured")),
         bands=(Band(new - around, new + around, "band", "rebuilt ± 2u"),),
-        spans=(rebuilt.interval,),
+        shaded=rebuilt.replaced[:, m],
         height=240,
     )
-    figures = [
-        figure(whole, f"{name} as measured, its zero taken off, and as rebuilt; the replaced interval is shaded.")
-    ]
+    figures = [figure(whole, f"{name} as measured, its zero taken off, and as rebuilt; replaced samples are shaded.")]
     if (close := _closer(whole, rebuilt.interval)) is not None:
         figures.append(figure(close, f"{name}, the replaced interval closer."))
     difference = replace(
@@ -104,6 +103,7 @@ def _closer(chart: Chart, interval: tuple[float, float]) -> Chart | None:
         key=f"closer-{chart.key}",
         title=f"{chart.title}, the replaced interval closer",
         time=chart.time[inside],
+        shaded=None if chart.shaded is None else chart.shaded[inside],
         lines=tuple(replace(line, values=line.values[inside]) for line in chart.lines),
         bands=tuple(replace(b, lower=b.lower[inside], upper=b.upper[inside]) for b in chart.bands),
     )

@@ -23,10 +23,7 @@ def identity(audit: Audit) -> list[tuple[str, str]]:
         ("Format", source.format),
         ("Rig", recording.rig.name),
         ("Channels", str(len(recording.channels))),
-        (
-            "Samples",
-            f"{len(time)} at {quantity(recording.rate, 'Hz', 5)}" if len(time) > 1 else str(len(time)),
-        ),
+        ("Samples", f"{len(time)}{rate}"),
         ("Time", f"{seconds(float(time[0]))} to {seconds(float(time[-1]))}"),
         ("Filter class", recording.rig.filter_class),
         ("Report number", number(audit)),

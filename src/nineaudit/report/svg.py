@@ -13,6 +13,7 @@ import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.report.axes import ticks, time_scale
+from nineaudit.report.chart import Band, Chart, Flags, Level, Line
 from nineaudit.report.decimate import IntArray, columns_of, envelope, runs, strokes
 from nineaudit.report.numbers import digits, printable
 
@@ -20,61 +21,6 @@ SCALE = 10
 """Drawing units a pixel: coordinates are whole numbers, exact to a tenth of a pixel."""
 ROOM = 10.0
 """Bands may widen the y range by so many ranges of the curves to either side; then they leave the picture."""
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """A curve: `values` (n,), `style` its class in the style sheet, `label` in the legend."""
-
-    values: FloatArray
-    style: str
-    label: str
-    name_at_peak: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Band:
-    """The area between `lower` (n,) and `upper` (n,)."""
-
-    lower: FloatArray
-    upper: FloatArray
-    style: str
-    label: str
-
-
-@dataclass(frozen=True, eq=False)
-class Flags:
-    """Samples of `values` (n,) to be marked where `mask` (n,)."""
-
-    values: FloatArray
-    mask: BoolArray
-    label: str
-
-
-@dataclass(frozen=True)
-class Level:
-    """A horizontal line with its name."""
-
-    value: float
-    label: str
-
-
-@dataclass(frozen=True, eq=False)
-class Chart:
-    """What to draw over `time` (n,) s. `key` makes the element ids unique; `unit` is the y axis'."""
-
-    key: str
-    title: str
-    description: str
-    time: FloatArray
-    unit: str
-    lines: tuple[Line, ...]
-    bands: tuple[Band, ...] = ()
-    flags: tuple[Flags, ...] = ()
-    levels: tuple[Level, ...] = ()
-    spans: tuple[tuple[float, float], ...] = ()
-    height: int = 200
-    columns: int = 900
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +62,7 @@ def draw(chart: Chart) -> str:
         f'<desc id="{chart.key}-d">{_text(chart.description)}</desc>',
         *_axes(frame),
         f'<svg y="0" width="100%" height="{chart.height}" {stretched}>',
-        *(_shade(frame, span) for span in chart.spans),
+        *_shade(frame),
         *(_band(frame, band) for band in chart.bands),
         *(f'<path class="level" d="M0 {int(frame.y(np.array(v.value)))}h{wide}"/>' for v in _levels(frame)),
         *(_line(frame, line) for line in chart.lines),
@@ -197,9 +143,22 @@ def _band(frame: _Frame, band: Band) -> str:
     return f'<path class="{band.style}" d="{"".join(pieces)}"/>' if pieces else ""
 
 
-def _shade(frame: _Frame, span: tuple[float, float]) -> str:
-    start, end = frame.x(np.clip(np.array(span), *frame.span)).tolist()
-    return f'<rect class="span" x="{start}" width="{max(end - start, SCALE)}" height="{frame.chart.height * SCALE}"/>'
+def _shade(frame: _Frame) -> list[str]:
+    if frame.chart.shaded is None:
+        return []
+    height = frame.chart.height * SCALE
+    stretches = _stretches(frame, frame.chart.shaded)
+    return [f'<rect class="span" x="{x}" width="{w}" height="{height}"/>' for x, w in stretches]
+
+
+def _stretches(frame: _Frame, mask: BoolArray) -> list[tuple[int, int]]:
+    """(start, width) of the runs of pixel columns that hold a sample where `mask` (n,)."""
+    hit = np.zeros(frame.chart.columns, dtype=np.bool_)
+    hit[frame.column[mask]] = True
+    if mask.size < frame.chart.columns:  # fewer samples than columns: neighbours belong together
+        for first, last in runs(mask):
+            hit[frame.column[first] : frame.column[last] + 1] = True
+    return [(a * SCALE, (b - a + 1) * SCALE) for a, b in runs(hit)]
 
 
 def _flags(frame: _Frame, flags: Flags) -> str:
@@ -207,9 +166,7 @@ def _flags(frame: _Frame, flags: Flags) -> str:
     at = np.flatnonzero(flags.mask & np.isfinite(flags.values))
     points = np.stack([frame.x(frame.chart.time)[at], frame.y(flags.values[at])], axis=1) // SCALE * SCALE
     dots = "".join(f"M{x} {y}h0" for x, y in np.unique(points, axis=0).tolist())
-    hit = np.zeros(frame.chart.columns, dtype=np.bool_)
-    hit[frame.column[flags.mask]] = True
-    rug = "".join(f"M{a * SCALE} 0h{(b - a + 1) * SCALE}" for a, b in runs(hit))
+    rug = "".join(f"M{start} 0h{width}" for start, width in _stretches(frame, flags.mask))
     y = frame.chart.height * SCALE - 2 * SCALE
     return f'<path class="flag" d="{dots}"/><path class="rug" transform="translate(0 {y})" d="{rug}"/>'
 

@@ -92,7 +92,8 @@ def _reason(finding: Finding) -> str:
     if finding.measure is None or finding.verdict not in _NUMBERS_SAY:
         return finding.reason
     doubt = "within its uncertainty of the limit" if finding.verdict is Verdict.INCONCLUSIVE else ""
-    return ", ".join(part for part in (finding.measure.detail, doubt) if part)
+    words = finding.measure.detail.rstrip(",; ")
+    return ", ".join(part for part in (words, doubt) if part)
 
 
 def interval(ends: tuple[float, float]) -> str:
