@@ -18,7 +18,6 @@ from nineaudit.estimate import budget, closed_form, condense, parity
 from nineaudit.estimate.motion import Motion, bridge, estimate_motion
 from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
 from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
-from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
 from nineaudit.physics import nap
 from nineaudit.recording import Recording
 
@@ -100,11 +99,6 @@ class Case:
         """
         start = None if self.rest is None else self.rest.start
         return estimate_motion(self.array, self.time, self.readings, self.sigma, start)
-
-    @cached_property
-    def evidence(self) -> tuple[ChannelEvidence, ...]:
-        """What each channel's own trace shows against it, in the order of the array."""
-        return find_evidence(self.recording, self.sigma)
 
     @cached_property
     def evidence(self) -> tuple[ChannelEvidence, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, Literal
+from typing import Final, Literal, Protocol
 
 from nineaudit.errors import ConfigurationError
 
@@ -48,3 +48,38 @@ def factor(unit: str, quantity: Quantity, *, place: str | None = None) -> float:
             expected="one of " + ", ".join(known),
         )
     return known[name]
+
+
+class UnitNames(Protocol):
+    """The units a rig speaks in (rig.Units)."""
+
+    @property
+    def length(self) -> str: ...
+    @property
+    def acceleration(self) -> str: ...
+    @property
+    def angular_rate(self) -> str: ...
+
+
+_SI_OF: dict[str, Quantity] = {"m/s^2": "acceleration", "rad/s": "angular_rate", "m": "length"}
+_SPELLED = {"g_0": "g", "1": "", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "rad/s^3": "rad/s³"}
+
+
+def in_rig_units(value: float, unit: str, names: UnitNames) -> tuple[float, str]:
+    """A value in an SI `unit` as (value, unit) of the rig; other units stay. Millivolt rigs speak of g_0."""
+    quantity = _SI_OF.get(unit)
+    if quantity is None:
+        return value, unit
+    name = str(getattr(names, quantity))
+    if name not in FACTORS[quantity]:
+        name = "g_0" if quantity == "acceleration" else unit
+    return value / FACTORS[quantity][name], name
+
+
+def display(value: float, unit: str, names: UnitNames, significant: int = 3) -> str:
+    """``12.4 g``: a value in an SI (or any other) `unit` with its unit, as the rig speaks."""
+    number, name = in_rig_units(value, unit, names)
+    spelled = _SPELLED.get(name, name)
+    whole = name == "samples" or (float(number).is_integer() and abs(number) < 1e6)
+    text = f"{number:.0f}" if whole else f"{number:.{significant}g}"
+    return f"{text} {spelled}" if spelled else text

@@ -1,1 +1,39 @@
+"""The checks: code -> function. A check computes a number and its limit; the engine gives the verdict.
 
+``check(case, *, limits...)`` answers with a Measure, one Measure per subject, or NotApplicable with its reason.
+The keyword-only parameters are the limits of the rule's sheet. A package adds a check by an entry point in the
+group ``nineaudit.checks``: its name is the code, its object the function; the sheet comes with ``--rules``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from importlib.metadata import entry_points
+
+from nineaudit.checks import budget, bus, clock, noise, offset, record, rigid_body
+from nineaudit.errors import ConfigurationError
+from nineaudit.finding import Measure, NotApplicable
+
+Check = Callable[..., Measure | Sequence[Measure] | NotApplicable]
+
+CHECKS: dict[str, Check] = {
+    **clock.CHECKS,
+    **record.CHECKS,
+    **noise.CHECKS,
+    **bus.CHECKS,
+    **offset.CHECKS,
+    **rigid_body.CHECKS,
+    **budget.CHECKS,
+}
+
+
+@cache
+def all_checks() -> dict[str, Check]:
+    """CHECKS and those of installed packages. ConfigurationError when a package claims a code that is taken."""
+    found = dict(CHECKS)
+    for point in entry_points(group="nineaudit.checks"):
+        if point.name in found:
+            raise ConfigurationError("the code of this check is taken", place=point.value, found=point.name)
+        found[point.name] = point.load()
+    return found

@@ -1,0 +1,155 @@
+"""Flat tops: where a channel stops following the signal at a level (SAE J211-1: look for overload in raw data).
+
+A smooth peak falls off as L − c t²/2, so it stays within w of its top for a time ∝ √w: the stretch within 8 w is
+2.8 times as long as the stretch within w. A clipped peak has steep edges instead: both are equally long.
+That comparison needs no knowledge of the signal, and holds for noise and coarse quantisation alike, since both
+only shorten the stretch within w. Three widths w are tried: identical values (a digital limit), four
+quantisation steps (a limit that wriggles), five noise deviations (a limit before the noise is added).
+
+The evidence of a flat stretch of n samples within w, m within 8 w, whose neighbours lie at least D lower, is
+(n − 1 − (m − n)) ln(D/w): the chance that so many samples of a signal that changes by D from sample to sample
+fall within w of its extreme. It adds over the stretches at one level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from nineaudit.array import BoolArray, FloatArray
+from nineaudit.estimate.evidence import IntArray, Moving, Stretch, always, edge_slopes, resolution, true_runs
+
+WIDER = 8.0
+"""The wide tolerance over the narrow one."""
+LONGEST = 1.5
+"""Largest ratio of the two stretches that counts as flat: a parabola has 2.83, a fourth-order top 1.68."""
+NATS_PER_SAMPLE = 7.0
+"""Cap on the evidence of one sample (1 in 1100), so that no pair of equal samples convinces alone; and not more
+than the logarithm of how many distinct values the trace has, which is all that is known of its resolution."""
+RAIL_NATS = 9.2
+"""Prior evidence (10⁴ : 1) of a level at the stated full scale."""
+
+
+@dataclass(frozen=True)
+class FlatTop:
+    """A level at which a channel is flat: the `stretches` there, `level` in the unit of the trace, `nats` the
+    evidence, `at_rail` whether the level is the stated full scale."""
+
+    level: float
+    stretches: tuple[Stretch, ...]
+    nats: float
+    at_rail: bool
+
+    @property
+    def samples(self) -> int:
+        return sum(len(s) for s in self.stretches)
+
+
+def flat_tops(
+    values: FloatArray,
+    noise: float,
+    *,
+    full_scale: float | None = None,
+    moving: Moving = always,
+    shortest: int = 3,
+    false_alarm: float = 1e-6,
+    rail_tolerance: float = 0.02,
+) -> tuple[FlatTop, ...]:
+    """Flat tops at the maximum and at the minimum of `values` (n,); at most one of each.
+
+    `noise` and `full_scale` in the unit of the values. A level counts when one stretch holds `shortest` samples
+    or more and the evidence reaches ln(1/false_alarm); a level within `rail_tolerance` (relative) of the full
+    scale, or beyond it, needs less.
+    """
+    found = []
+    for sign in (1.0, -1.0):
+        signal = sign * np.where(np.isfinite(values), values, np.nan)
+        if np.isfinite(signal).sum() < 8 * shortest:
+            continue
+        top = float(np.nanmax(signal))
+        at_rail = full_scale is not None and abs(top) >= (1.0 - rail_tolerance) * full_scale
+        needed = np.log(1.0 / false_alarm) - (RAIL_NATS if at_rail else 0.0)
+        best = _best_width(signal, top, noise, moving, shortest, at_rail)
+        if best is not None and best[1] >= needed:
+            stretches = tuple(Stretch(s.start, s.stop, sign * top, s.nats) for s in best[0])
+            found.append(FlatTop(sign * top, stretches, best[1], at_rail))
+    return tuple(found)
+
+
+def _best_width(
+    signal: FloatArray, top: float, noise: float, moving: Moving, shortest: int, at_rail: bool
+) -> tuple[tuple[Stretch, ...], float] | None:
+    """The most convincing of the three widths: its stretches and their evidence."""
+    step = max(resolution(signal), 1e-9 * float(np.nanmax(signal) - np.nanmin(signal)))
+    cap = min(NATS_PER_SAMPLE, float(np.log(np.unique(signal[np.isfinite(signal)]).size)))
+    best: tuple[tuple[Stretch, ...], float] | None = None
+    for near_width, width, noisy in (
+        (0.0, step, False),
+        (4 * step, 4 * step, False),
+        (5 * noise, 5 * max(noise, step), True),
+    ):
+        if width <= 0.0 or top - np.nanmin(signal) < 3.0 * WIDER * width:
+            continue
+        near = signal >= top - near_width - 1e-12 * abs(top)
+        flats = [
+            s
+            for s in _flat_stretches(signal, near, top, width, cap)
+            if (not noisy or _structureless(signal[s.start : s.stop]))
+            and _arrives(signal, s, top, noise, width, at_rail)
+            and (at_rail or moving(s.start - 1, s.stop + 1))
+        ]
+        nats = sum(s.nats for s in flats)
+        if any(len(s) >= shortest for s in flats) and (best is None or nats > best[1]):
+            best = _all_at_level(near, flats, top), nats
+    return best
+
+
+def _flat_stretches(signal: FloatArray, near: BoolArray, top: float, width: float, cap: float) -> Iterator[Stretch]:
+    """Stretches within 8 widths of the top that are flat: at most LONGEST times what lies within one width."""
+    starts, stops = true_runs(signal >= top - WIDER * width)
+    count = np.concatenate([[0], np.cumsum(near)])
+    for a, b in zip(*_inside(starts, stops, signal.size), strict=True):
+        n, m = int(count[b] - count[a]), int(b - a)
+        if n < 2 or m > LONGEST * n:
+            continue
+        members = np.flatnonzero(near[a:b]) + a
+        drop = top - max(signal[a - 1], signal[b])
+        if np.isfinite(drop):
+            nats = max(0, n - 1 - (m - n)) * min(float(np.log(drop / width)), cap)
+            yield Stretch(int(members[0]), int(members[-1]) + 1, top, nats)
+
+
+def _inside(starts: IntArray, stops: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Runs that begin and end inside the record."""
+    inside = (starts > 1) & (stops < n - 1)
+    return starts[inside], stops[inside]
+
+
+def _structureless(plateau: FloatArray) -> bool:
+    """Whether the samples of a plateau scatter like noise: von Neumann's ratio, 2 for white noise, near 0 for a
+    smooth curve. Needs 8 samples."""
+    if plateau.size < 8:
+        return False
+    spread = float(np.var(plateau))
+    return spread == 0.0 or float(np.mean(np.diff(plateau) ** 2)) / spread > 1.0
+
+
+def _arrives(signal: FloatArray, s: Stretch, top: float, noise: float, width: float, at_rail: bool) -> bool:
+    """Whether the signal outside was on its way to the level at both ends, within two sample intervals.
+
+    A stretch that is jumped to out of nowhere is a dropout, not an overload; at the rail it is an overload.
+    """
+    if at_rail:
+        return True
+    edges = edge_slopes(signal, s.start, s.stop, top)
+    return edges is not None and bool(np.all(edges[:, 0] <= 2.0 * edges[:, 1].clip(0) + 6.0 * noise + 4.0 * width))
+
+
+def _all_at_level(near: BoolArray, flats: list[Stretch], top: float) -> tuple[Stretch, ...]:
+    """The flat stretches and every other sample at their level."""
+    covered = near.copy()
+    for s in flats:
+        covered[s.start : s.stop] = True
+    return tuple(Stretch(int(a), int(b), top) for a, b in zip(*true_runs(covered), strict=True))
