@@ -114,8 +114,9 @@ def _axes(frame: _Frame) -> list[str]:
     for value in ticks(edges[0], edges[1], 6):
         left = frame.left(value * one + origin)
         parts.append(f'<line class="grid" x1="{left}" x2="{left}" y2="{bottom}"/>')
-        shown = f'<text class="tick" x="{left}" y="{bottom + 15}" text-anchor="middle">{digits(value, 6)}</text>'
-        parts.append(shown)
+        anchor = "end" if value > edges[1] - 0.03 * (edges[1] - edges[0]) else "middle"
+        place = f'x="{left}" y="{bottom + 15}" text-anchor="{anchor}"'
+        parts.append(f'<text class="tick" {place}>{digits(value, 6)}</text>')
     parts.append(f'<text class="unit" x="-8" y="-9" text-anchor="end">{_text(chart.unit)}</text>')
     parts.append(f'<text class="unit" x="100%" y="{bottom + 30}" text-anchor="end">{_text(label)}</text>')
     return parts

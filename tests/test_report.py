@@ -1,0 +1,400 @@
+"""The HTML report: complete, honest about every rule, deterministic, and deaf to hostile names."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+import nineaudit
+from nineaudit import report
+from nineaudit.diagnose import Diagnosis, Status
+from nineaudit.report.axes import ticks, time_scale
+from nineaudit.report.chart import Band, Chart, Flags, Level, Line
+from nineaudit.report.decimate import columns_of, envelope, runs, strokes
+from nineaudit.report.svg import SCALE, draw
+from nineaudit.rig import parse_rig, preset_text
+from nineaudit.simulate import parse_fault, simulate
+from report_example import ambiguous, example, healthy
+
+HOSTILE = "<script>alert(1)</script>\"'&{{7*7}}"
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, and the visible text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self._hidden = False
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self._hidden = tag == "style"
+
+    def handle_data(self, data: str) -> None:
+        if not self._hidden:
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+    def every(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture(scope="module")
+def page() -> Page:
+    return Page(report.render(example()))
+
+
+# ---- what the page says ---------------------------------------------------------------------------------------
+
+
+def test_verdict_culprit_and_next_best_stand_first(page: Page) -> None:
+    head = page.text[: page.text.index("Identification Recording")]
+    assert "Channel a1y is at fault: clipping, probability 0.98." in head
+    assert "Next best candidate: a2x" in head
+    assert "peak α" in head
+    assert "8120" in head
+    assert "5260" in head
+
+
+def test_every_rule_and_every_verdict_is_there(page: Page) -> None:
+    audit = example()
+    assert {t["id"] for t in page.every("tbody") if "id" in t} == {f.rule for f in audit.findings}
+    for verdict in {str(f.verdict).replace("_", " ") for f in audit.findings}:
+        assert re.search(rf"[✓✕!?~·] {verdict}\b", page.text), verdict
+
+
+def test_every_channel_of_a_rule_is_there(page: Page) -> None:
+    assert "9 results: 1 warn, 8 pass of ZO301" in page.text
+    assert sum(t == {"class": "each"} for t in page.every("table")) == 1
+
+
+def test_original_is_said_to_be_unaltered_with_its_hash(page: Page) -> None:
+    assert "The original recording is not altered" in page.text
+    assert example().recording.source.sha256 in page.text
+    assert "same bytes before and after reading" in page.text
+
+
+def test_a_recording_that_changed_while_read_is_said_so() -> None:
+    audit = example(201)
+    source = replace(audit.recording.source, unchanged_after_read=False)
+    changed = replace(audit, recording=replace(audit.recording, source=source))
+    assert "CHANGED while it was read" in report.render(changed)
+
+
+def test_a_group_is_not_a_culprit() -> None:
+    text = Page(report.render(ambiguous())).text
+    assert "The fault is in a1y or a2x, probability > 0.99; this motion cannot tell them apart." in text
+    assert "Rebuilt channel" not in text
+
+
+def test_a_pass_says_what_it_means() -> None:
+    text = Page(report.render(healthy())).text
+    assert "No channel is at fault." in text
+    assert "A lasting shift of 0.8 g in any channel would have shown." in text
+    assert "Motion of the body" not in text
+
+
+def test_undiagnosed_gives_its_reason() -> None:
+    audit = replace(healthy(), verdict="inconclusive", diagnosis=Diagnosis(Status.UNDIAGNOSED, (), (), "no redundancy"))
+    assert "No culprit named: no redundancy." in Page(report.render(audit)).text
+
+
+def test_report_number_is_of_what_the_report_rests_on() -> None:
+    def numbers(audit: Any) -> str:
+        found = re.search(r"Report number</dt><dd>([0-9a-f]{12})<", report.render(audit))
+        assert found
+        return found[1]
+
+    audit = example(201)
+    other = replace(audit, tool={**audit.tool, "version": "0.2.0"})
+    assert numbers(audit) == numbers(example(201)) != numbers(other)
+
+
+def test_a_real_audit_has_what_reports_ask_of_it() -> None:
+    rig = parse_rig(preset_text("naap-3222"))
+    made = simulate(rig, "general", faults=(parse_fault("a1y:clipping=0.5"),), seed=1)
+    audit = nineaudit.audit(made.recording)
+    text = Page(report.render(audit)).text
+    assert "Channel a1y is at fault: clipping" in text
+    assert text.count("named by the diagnosis") == 1
+    Draft202012Validator(report.result_schema()).validate(report.result_document(audit))
+    assert {f["rule"] for f in report.result_document(audit)["findings"]} == set(audit.rulebook.codes)
+
+
+# ---- form -----------------------------------------------------------------------------------------------------
+
+
+def test_same_audit_same_bytes() -> None:
+    assert report.render(example(501)) == report.render(example(501))
+
+
+def test_nothing_is_fetched_and_nothing_runs(page: Page) -> None:
+    assert not {"script", "link", "img", "iframe", "object", "form", "base"} & {tag for tag, _ in page.tags}
+    for tag, attributes in page.tags:
+        assert not [name for name in attributes if name.startswith("on") or name == "style"], tag
+        for name in ("src", "href", "xlink:href"):
+            assert (attributes.get(name) or "#").startswith("#"), tag
+    policy = next(m["content"] for m in page.every("meta") if m.get("http-equiv") == "Content-Security-Policy")
+    assert policy
+    assert policy.startswith("default-src 'none'; style-src 'sha256-")
+    assert "unsafe" not in policy
+
+
+def test_structure_for_people_who_listen(page: Page) -> None:
+    assert [t for t, _ in page.tags].count("h1") == 1
+    levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch(r"h[1-6]", tag)]
+    assert all(b - a <= 1 for a, b in pairwise(levels))
+    assert page.every("html")[0]["lang"] == "en"
+    assert len(page.every("table")) == len(page.every("caption"))
+    assert all("scope" in th for th in page.every("th"))
+    charts = [s for s in page.every("svg") if s.get("role") == "img"]
+    ids = [a["id"] for _, a in page.tags if "id" in a]
+    assert len(ids) == len(set(ids))
+    for chart in charts:
+        assert set((chart["aria-labelledby"] or "").split()) <= set(ids)
+    assert len(charts) == 9 + 3 + 3 + 3
+    targets = {(a["href"] or "")[1:] for a in page.every("a")}
+    assert targets <= set(ids)
+
+
+@pytest.mark.parametrize("where", ["channel", "rig", "path"])
+def test_hostile_names_are_only_text(where: str) -> None:
+    text = preset_text("naap-3222")
+    toml = HOSTILE.replace('"', '\\"')
+    if where == "rig":
+        text = re.sub(r'name = "nine[^"]*"', f'name = "{toml}"', text)
+    audit = example(201, rig_text=text, path=f"runs/{HOSTILE}.blf" if where == "path" else "runs/T.blf")
+    if where == "channel":
+        audit = _renamed(audit, HOSTILE)
+    page = Page(report.render(audit))
+    assert HOSTILE in page.text
+    assert not page.every("script")
+    assert "49" not in page.text.replace(HOSTILE, "").split()
+    report.to_json(report.result_document(audit))
+    report.junit([audit])
+
+
+def _renamed(audit: Any, name: str) -> Any:
+    """The audit with its culprit under another name."""
+    rig = audit.recording.rig
+    sensors = tuple(replace(s, channel=name) if s.channel == "a1y" else s for s in rig.array.sensors)
+    array = type(rig.array)(sensors)
+    recording = replace(audit.recording, rig=replace(rig, array=array))
+    best = replace(audit.diagnosis.candidates[0], channels=(name,))
+    diagnosis = replace(
+        audit.diagnosis,
+        channels=(name,),
+        candidates=(best, *audit.diagnosis.candidates[1:]),
+        smallest_detectable={name: 1.0},
+        smallest_isolable={name: 2.0},
+    )
+    finding = replace(audit.findings[1], channels=(name,), reason=f"{name} is flat", measure=None)
+    return replace(
+        audit,
+        recording=recording,
+        diagnosis=diagnosis,
+        findings=(finding,),
+        reconstruction=replace(audit.reconstruction, channels=(name,)),
+        flagged={name: audit.flagged["a1y"]},
+    )
+
+
+def test_nine_channels_of_twenty_thousand_samples_are_small() -> None:
+    assert len(report.render(example(20_000)).encode()) < 3_000_000
+
+
+def test_worst_case_of_flags_and_noise_is_small() -> None:
+    audit = example(20_000)
+    everything = {c: np.ones(20_000, dtype=bool) for c in audit.recording.channels}
+    rng = np.random.default_rng(1)
+    recording = replace(audit.recording, readings=rng.standard_normal((20_000, 9)))
+    assert len(report.render(replace(audit, recording=recording, flagged=everything)).encode()) < 3_000_000
+
+
+@pytest.mark.parametrize("samples", [2, 3])
+def test_records_of_a_few_samples(samples: int) -> None:
+    audit = healthy(401)
+    recording = replace(
+        audit.recording,
+        time=audit.recording.time[:samples],
+        readings=audit.recording.readings[:samples],
+        valid=audit.recording.valid[:samples],
+    )
+    assert "End of report" in report.render(replace(audit, recording=recording))
+
+
+def test_a_channel_without_a_valid_sample() -> None:
+    audit = healthy(201)
+    readings = audit.recording.readings.copy()
+    readings[:, 2] = np.nan
+    text = report.render(replace(audit, recording=replace(audit.recording, readings=readings)))
+    assert "no valid sample" in text
+    assert "nan" not in text.lower().split()
+
+
+# ---- writing --------------------------------------------------------------------------------------------------
+
+
+def test_write_leaves_one_whole_file(tmp_path: Path) -> None:
+    path = report.write_report(example(201), tmp_path / "T0001.html")
+    assert path.read_text(encoding="utf-8") == report.render(example(201))
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "T0001.html"
+    path.write_text("old")
+
+    def refuse(_: Path, target: Path) -> None:
+        raise PermissionError(str(target))
+
+    monkeypatch.setattr(Path, "replace", refuse)
+    with pytest.raises(PermissionError):
+        report.write_report(example(201), path)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+# ---- figures: laws of the decimation --------------------------------------------------------------------------
+
+
+def curve(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    values = np.cumsum(rng.standard_normal(n))
+    values[rng.integers(0, n, 3)] += 50.0 * rng.standard_normal(3)  # spikes that LTTB would lose
+    return np.linspace(-1.0, 2.0, n), values
+
+
+@pytest.mark.parametrize(("n", "columns"), [(20_000, 900), (5_000, 600), (1_801, 900), (700, 900)])
+def test_decimation_keeps_the_envelope_of_every_column(n: int, columns: int) -> None:
+    time, values = curve(n, 3)
+    column = columns_of(time, (time[0], time[-1]), columns)
+    kept = np.concatenate(strokes(time, values, column))
+    assert len(kept) <= 2 * columns
+    assert np.all(np.diff(kept) > 0)
+    for c in np.unique(column):
+        inside, drawn = values[column == c], values[kept[column[kept] == c]]
+        assert drawn.min() == inside.min()
+        assert drawn.max() == inside.max()
+
+
+def test_decimation_breaks_at_missing_samples_and_gaps_of_the_clock() -> None:
+    time, values = curve(20_000, 4)
+    values[4_000:4_500] = np.nan
+    late = np.where(np.arange(20_000) >= 12_000, time + 0.3, time)
+    column = columns_of(late, (late[0], late[-1]), 900)
+    pieces = strokes(late, values, column)
+    assert [p[-1] < 4_000 for p in pieces] == [True, False, False]
+    assert pieces[1][0] >= 4_500
+    assert pieces[1][-1] < 12_000 <= pieces[2][0]
+
+
+def test_a_lone_sample_is_still_a_stroke() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    values = np.full(11, np.nan)
+    values[5] = 1.0
+    assert [p.tolist() for p in strokes(time, values, columns_of(time, (0.0, 1.0), 100))] == [[5]]
+    assert strokes(time, np.full(11, np.nan), columns_of(time, (0.0, 1.0), 100)) == []
+
+
+def test_band_holds_every_sample_of_both_edges() -> None:
+    time, middle = curve(20_000, 5)
+    column = columns_of(time, (time[0], time[-1]), 300)
+    lower, upper = middle - 1.0, middle + 2.0
+    ((at, low, high),) = envelope(lower, upper, column)
+    assert at.tolist() == list(range(300))
+    assert np.all(low[column] <= lower)
+    assert np.all(high[column] >= upper)
+
+
+def test_runs() -> None:
+    assert runs(np.array([True, True, False, True])) == [(0, 1), (3, 3)]
+    assert runs(np.zeros(3, dtype=bool)) == []
+
+
+def chart(n: int = 5_000, **changes: Any) -> Chart:
+    time, values = curve(n, 6)
+    plain = Chart("k", "Title", "What it shows.", time, "g", (Line(values, "measured", "a"),))
+    return replace(plain, **changes)
+
+
+def test_drawn_path_reaches_the_extremes_to_a_tenth_of_a_pixel() -> None:
+    plot = chart(flags=())
+    found = re.search(r'class="line measured" d="([^"]+)"', draw(plot))
+    assert found
+    points = []
+    for piece in found[1].split("M")[1:]:
+        start, steps = piece.split("l")
+        moves = np.array(steps.split(), dtype=int).reshape(-1, 2)
+        points.append(np.array(start.split(), dtype=int) + np.vstack([[0, 0], np.cumsum(moves, axis=0)]))
+    y = np.concatenate(points)[:, 1]
+    values = plot.lines[0].values
+    pad = 0.06 * np.ptp(values)
+    expected = plot.height * SCALE * pad / (np.ptp(values) + 2 * pad)
+    assert y.min() == pytest.approx(expected, abs=1.0)
+    assert plot.height * SCALE - y.max() == pytest.approx(expected, abs=1.0)
+
+
+@pytest.mark.parametrize("n", [300, 20_000])
+def test_every_flagged_sample_is_drawn(n: int) -> None:
+    time, values = curve(n, 7)
+    mask = np.random.default_rng(2).random(n) < 0.01
+    plot = chart(n, lines=(Line(values, "measured", "a"),), flags=(Flags(values, mask, "flagged"),))
+    found = re.search(r'class="flag" d="([^"]+)"', draw(plot))
+    assert found
+    drawn = {tuple(map(int, p.removesuffix("h0").split())) for p in found[1].split("M")[1:]}
+    low, high = values.min(), values.max()
+    pad = 0.06 * (high - low)
+    x = np.rint((time - time[0]) / (time[-1] - time[0]) * 9000)[mask]
+    y = np.rint((high + pad - values) / (high - low + 2 * pad) * 2000)[mask]
+    reached = np.array(sorted(drawn), dtype=float)
+    for point in np.stack([x, y], axis=1):
+        assert np.abs(reached - point).max(axis=1).min() <= SCALE
+
+
+def test_chart_text_is_escaped_and_levels_out_of_sight_are_left_out() -> None:
+    text = draw(chart(title=HOSTILE, unit="<g>", levels=(Level(1e9, "range"), Level(0.0, "<zero>"))))
+    assert "<script" not in text
+    assert "&lt;g&gt;" in text
+    assert "&lt;zero&gt;" in text
+    assert ">range<" not in text
+
+
+def test_flat_and_empty_curves_can_be_drawn() -> None:
+    time = np.linspace(0.0, 1.0, 50)
+    for values in (np.zeros(50), np.full(50, 7.0), np.full(50, np.nan)):
+        band = Band(values, values, "band", "b")
+        text = draw(Chart("k", "t", "d", time, "g", (Line(values, "measured", "", name_at_peak=True),), (band,)))
+        assert "nan" not in text
+
+
+@pytest.mark.parametrize(("low", "high"), [(-1.0, 1.0), (0.013, 0.47), (-3900.0, 3200.0), (1e6, 1.1e6), (-0.02, 0.18)])
+@pytest.mark.parametrize("about", [4, 6, 9])
+def test_ticks_are_round_inside_and_enough(low: float, high: float, about: int) -> None:
+    found = ticks(low, high, about)
+    assert 3 <= len(found) <= 3 * about
+    assert low - 1e-9 * abs(low) <= found[0] <= found[-1] <= high * (1 + 1e-9)
+    step = found[1] - found[0]
+    assert min(abs(step / 10 ** np.floor(np.log10(step) + 1e-9) - m) for m in (1, 2, 5)) < 1e-6
+
+
+def test_time_axis_counts_from_zero_unless_the_clock_is_far_away() -> None:
+    assert time_scale(np.array([-0.02, 0.18])) == (0.0, 1e-3, "time, ms")
+    assert time_scale(np.array([0.0, 60.0]))[1:] == (1.0, "time, s")
+    origin, _, label = time_scale(1.7e9 + np.array([0.0, 10.0]))
+    assert origin == 1.7e9
+    assert "since the first sample" in label
