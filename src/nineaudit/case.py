@@ -167,7 +167,8 @@ class Case:
         readings = bridge(whole.readings[:, index], whole.time)
         blocks = replace(whole, readings=readings, sigma=whole.sigma[index])
         motion = self._motion_of(nine, blocks)
-        return closed_form.make_problem(nine, blocks.time, readings, blocks.sigma, motion, arms)
+        rest = 0 if self.rest is None else (self.rest.stop - self.rest.start) // blocks.length
+        return closed_form.make_problem(nine, blocks.time, readings, blocks.sigma, motion, arms, rest)
 
     @cached_property
     def nap_healthy(self) -> closed_form.Hypothesis:

@@ -131,7 +131,7 @@ def _group(fit: ClosedFormFit, holding: list[int]) -> list[int]:
 
     def apart(k: int) -> bool:
         costs = fit.free[k].excess - fit.free[best].excess
-        return costs > slack and closed_form.separation(fit.problem, fit.free[k], best, claimed) > SEPARATION
+        return costs > slack and closed_form.separations(fit.problem, fit.free[k], claimed)[best] > SEPARATION
 
     near = [k for k in holding if k != best and not apart(k)]
     return [best, *sorted(near, key=lambda k: fit.free[k].excess)]
@@ -147,15 +147,14 @@ def _smallest(fit: ClosedFormFit) -> tuple[dict[str, float], dict[str, float]]:
     moving = np.linalg.norm(problem.readings / problem.sigma, axis=1) > 9.0
     step = (np.cumsum(moving) > 0).astype(float)
     needed = closed_form.limit_per_dof(fit.healthy.dof) * fit.healthy.dof - fit.healthy.dof
-    detectable, isolable = {}, {}
-    for k, name in enumerate(fit.names):
-        seen = closed_form.separation(problem, fit.healthy, k, step)
-        others = [closed_form.separation(problem, h, k, step) for h in fit.free if h.channel != k]
-        apart = min(others)
-        slack = SEPARATION + closed_form.MODEL_SLACK * fit.free[k].dof / 3.0
-        detectable[name] = float(np.sqrt(needed / seen)) if seen > 0 else np.inf
-        isolable[name] = float(np.sqrt(slack / apart)) if apart > 0 else np.inf
-    return detectable, isolable
+    seen = closed_form.separations(problem, fit.healthy, step)
+    rivals = np.stack([closed_form.separations(problem, h, step) for h in fit.free])
+    np.fill_diagonal(rivals, np.inf)
+    slack = SEPARATION + closed_form.MODEL_SLACK * fit.free[0].dof / 3.0
+    with np.errstate(divide="ignore"):
+        detectable, isolable = np.sqrt(needed / seen), np.sqrt(slack / rivals.min(axis=0))
+    names = fit.names
+    return dict(zip(names, detectable.tolist(), strict=True)), dict(zip(names, isolable.tolist(), strict=True))
 
 
 def _candidates(fit: ClosedFormFit, evidence: Mapping[str, str]) -> tuple[Candidate, ...]:

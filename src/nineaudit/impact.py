@@ -81,7 +81,7 @@ def _scatter(case: Case, fixed: FloatArray, repair: Reconstruction) -> dict[str,
     """Standard deviation of the reported values over draws of every calibration error, the noise, and the
     rebuilt channel's uncertainty (one draw for its whole curve: it is calibration that dominates it)."""
     rng = np.random.default_rng(SEED)
-    step = max(1, len(case.time) // 2000)
+    step = max(1, len(case.time) // 1000)
     time, readings = case.time[::step], bridge(fixed, case.time)[::step]
     start = None if case.rest is None else case.rest.start // step
     motion = estimate_motion(case.array, time, readings, case.sigma, start)

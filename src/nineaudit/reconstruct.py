@@ -9,8 +9,8 @@ import numpy as np
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.case import Case
 from nineaudit.errors import EstimationError
-from nineaudit.estimate import calibration
-from nineaudit.estimate.motion import bridge, estimate_motion
+from nineaudit.estimate import closed_form
+from nineaudit.estimate.motion import bridge
 from nineaudit.physics import nap, rigid_body
 
 
@@ -46,10 +46,9 @@ def rebuild_channel(case: Case, channel: str, replaced: BoolArray | None = None)
     `replaced` (n,) the samples to stand for the measured ones; default all from the first sample after the quiet
     interval. EstimationError when the channel is not one of nine that form an ideal 3-2-2-2.
     """
-    if case.nap_layout is None:
-        raise EstimationError("only an ideal 3-2-2-2 array can be rebuilt by closed forms")
-    columns, arms = case.nap_layout
-    index = list(columns)
+    index, arms = nap_columns(case)
+    problem = case.nap_problem
+    assert problem is not None
     column = case.array.index(channel)
     if column not in index:
         raise EstimationError(f"{channel} is not one of the nine channels of the 3-2-2-2 array")
@@ -59,8 +58,7 @@ def rebuild_channel(case: Case, channel: str, replaced: BoolArray | None = None)
     readings = np.zeros((len(case.time), 9))
     readings[:, others] = bridge(case.readings[:, [index[i] for i in others]], case.time)
     rebuilt = nap.rebuild(name, readings, arms, case.time)
-    readings[:, index.index(column)] = rebuilt
-    u = _uncertainty(case, index, readings, arms, index.index(column))
+    u = _uncertainty(case, problem, rebuilt, index.index(column))
     where = _default_replaced(case) if replaced is None else replaced
     where = where | ~np.isfinite(case.readings[:, column])
     inside = np.flatnonzero(where)
@@ -87,29 +85,24 @@ def _default_replaced(case: Case) -> BoolArray:
     return where
 
 
-def _uncertainty(
-    case: Case, index: list[int], readings: FloatArray, arms: FloatArray, missing: int
-) -> FloatArray:
+def _uncertainty(case: Case, problem: closed_form.Problem, rebuilt: FloatArray, missing: int) -> FloatArray:
     """(n,) standard uncertainty: white noise through the row of the closed form, and every calibration error of
-    the donors through the closed form itself (central difference of one standard deviation)."""
-    nine, name = case.array.select(index), nap.CHANNELS[missing]
-    sigma = case.sigma[index]
-    row = nap.closed_form(name, arms).row
-    start = None if case.rest is None else case.rest.start
-    motion = estimate_motion(nine, case.time, readings, sigma, start)
-    variance = np.full(len(case.time), float(row**2 @ sigma**2))
-    for i, sensor in enumerate(nine.sensors):
-        if i == missing:
-            continue
-        columns = calibration.columns(sensor, readings[:, i], case.time, motion) * calibration.prior_sd(
-            sensor
-        )
-        for pattern in columns.T[np.any(columns, axis=0)]:
-            step = np.zeros_like(readings)
-            step[:, i] = pattern
-            up, down = (nap.rebuild(name, readings + s * step, arms, case.time) for s in (1.0, -1.0))
-            variance += (0.5 * (up - down)) ** 2
-    return np.sqrt(variance)
+    the donors through its derivative, computed on the blocks of the problem and interpolated."""
+    readings = problem.readings.copy()
+    readings[:, missing] = np.interp(problem.time, case.time, rebuilt)
+    omega = nap.omega(readings, problem.arms, problem.time)
+    moved = closed_form.rebuilt_response(problem, missing, omega, problem.patterns, problem.turned)
+    calibration = np.interp(case.time, problem.time, (moved**2).sum(axis=(0, 2)))
+    columns, _ = nap_columns(case)
+    row = nap.closed_form(nap.CHANNELS[missing], problem.arms).row
+    return np.sqrt(calibration + row**2 @ case.sigma[columns] ** 2)
+
+
+def nap_columns(case: Case) -> tuple[list[int], FloatArray]:
+    """Columns of the nine channels, and the arms. EstimationError where the array holds no ideal 3-2-2-2."""
+    if case.nap_layout is None:
+        raise EstimationError("only an ideal 3-2-2-2 array can be rebuilt by closed forms")
+    return list(case.nap_layout[0]), case.nap_layout[1]
 
 
 def _bound_ratio(case: Case, index: list[int], arms: FloatArray, missing: int) -> float:

@@ -123,6 +123,10 @@ def zero_after(case: Case, *, budget_sd: float) -> Sequence[Measure] | NotApplic
     rest, end = case.required_rest, quiet_end(case.time, case.recording.readings, case.sigma)
     if end is None or end.start < rest.stop:
         return NotApplicable("the record does not end at rest")
+    turning = float(np.linalg.norm(case.motion.omega[end.samples], axis=1).max())
+    reach = float(np.linalg.norm(case.array.positions - case.array.positions.mean(axis=0), axis=1).max())
+    if reach * turning**2 > float(np.median(case.array.values("u_zero")[case.array.is_accelerometer])):
+        return NotApplicable(f"the body seems to turn at {turning:.3g} rad/s at the end of the record")
     before, after = (_departures(case, _mean(case.recording.readings, q)) for q in (rest, end))
     spread = np.hypot(_u_mean(case, rest), _u_mean(case, end))
     sensors = case.array.sensors

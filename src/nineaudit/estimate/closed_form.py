@@ -13,6 +13,7 @@ Cost over degrees of freedom is near 1 for a hypothesis that holds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class Hypothesis:
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Nine columns in the order of nap.CHANNELS: channel `names`, `time` (n,), `readings` (n,9), `sigma` (9,),
-    `patterns` (9,n,8) calibration responses of one standard deviation, `arms` (3,); SI."""
+    `patterns` (9,n,p) calibration errors and slow noise of one standard deviation, `arms` (3,); SI."""
 
     names: tuple[str, ...]
     time: FloatArray
@@ -55,6 +56,12 @@ class Problem:
     sigma: FloatArray
     patterns: FloatArray
     arms: FloatArray
+
+    @cached_property
+    def turned(self) -> FloatArray:
+        """(9,n,p) ∫patterns dt."""
+        flat = np.moveaxis(self.patterns, 0, 1).reshape(len(self.time), -1)
+        return np.moveaxis(kinematics.integrate(flat, self.time).reshape(-1, *self.patterns[:, 0].shape), 1, 0)
 
 
 def make_problem(
@@ -64,10 +71,22 @@ def make_problem(
     sigma: FloatArray,
     motion: Motion,
     arms: FloatArray,
+    rest_blocks: int = 0,
 ) -> Problem:
-    """`nine` sensors and their columns in the order of nap.CHANNELS; `readings` without gaps."""
+    """`nine` sensors and their columns in the order of nap.CHANNELS; `readings` without gaps. `rest_blocks`: how
+    many of the samples the zero was taken from."""
     patterns = calibration.all_columns(nine, readings, time, motion)
-    return Problem(nine.channels, time, readings, sigma, patterns, arms)
+    modes = slow_noise(len(time), rest_blocks)[None] * sigma[:, None, None]
+    return Problem(nine.channels, time, readings, sigma, np.concatenate([patterns, modes], axis=2), arms)
+
+
+def slow_noise(count: int, rest_blocks: int) -> FloatArray:
+    """(n,7) what white noise of standard deviation 1 does slowly, which ∫ lets grow: its six lowest cosine modes,
+    √(2/n) cos(jπt/T) with a coefficient of sd 1 each, and the error of the zero, 1/√rest_blocks."""
+    phase = np.pi * (np.arange(count) + 0.5) / count
+    modes = np.sqrt(2.0 / count) * np.cos(phase[:, None] * np.arange(1, 7))
+    zero = np.full((count, 1), 1.0 / np.sqrt(rest_blocks) if rest_blocks else 1.0 / np.sqrt(count))
+    return np.hstack([zero, modes])
 
 
 def replaced(problem: Problem, channel: int | None, readings: FloatArray) -> FloatArray:
@@ -99,27 +118,41 @@ def whitener(problem: Problem, channel: int | None) -> FloatArray:
     return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T)
 
 
-def response(problem: Problem, channel: int | None, column: int, patterns: FloatArray) -> FloatArray:
-    """(n,3,p) derivative of the residual under a hypothesis along `patterns` (n,p) in one channel.
+def response(problem: Problem, channel: int | None, patterns: FloatArray, turned: FloatArray) -> FloatArray:
+    """(9,n,3,p) derivative of the residual under a hypothesis along `patterns` (9,n,p), one set in each channel.
 
-    A fault f in channel i moves the rebuilt channel c by δy_c = row_i f + ω_k (v·δω) + δω_k (v·ω) and the residual
-    by δr = P_i f + P_c δy_c − δ(ωyωz, ωzωx, ωxωy), with δω = A_i ∫f + A_c ∫δy_c  (nap.closed_form; eqs 12, 14).
+    `turned` (9,n,p) is ∫patterns dt. A fault f in channel i moves the rebuilt channel c by δy_c (rebuilt_response)
+    and the residual by δr = P_i f + P_c δy_c − δ(ωyωz, ωzωx, ωxωy), δω = A_i ∫f + A_c ∫δy_c  [Takhounts09 eqs 12, 14].
+    The free channel itself has no response.
     """
     products, alphas = nap.product_rows(problem.arms), nap.alpha_rows(problem.arms)
     omega = nap.omega(replaced(problem, channel, problem.readings), problem.arms, problem.time)
-    turned = kinematics.integrate(patterns, problem.time)
-    direct = products[:, column, None] * patterns[:, None, :]
-    spin = alphas[:, column, None] * turned[:, None, :]
+    direct = np.einsum("ic,cnp->cnip", products, patterns)
+    spin = np.einsum("ic,cnp->cnip", alphas, turned)
     if channel is not None:
-        form = nap.closed_form(nap.CHANNELS[channel], problem.arms)
-        along = form.direction @ alphas[:, column]
-        moved = form.row[column] * patterns + turned * (
-            omega[:, [form.axis]] * along + (omega @ form.direction)[:, None] * alphas[form.axis, column]
-        )
-        direct = direct + products[:, channel, None] * moved[:, None, :]
-        spin = spin + alphas[:, channel, None] * kinematics.integrate(moved, problem.time)[:, None, :]
+        moved = rebuilt_response(problem, channel, omega, patterns, turned)
+        flat = np.moveaxis(moved, 0, 1).reshape(len(problem.time), -1)
+        swept = np.moveaxis(kinematics.integrate(flat, problem.time).reshape(-1, 9, moved.shape[2]), 1, 0)
+        direct += products[:, channel, None] * moved[:, :, None, :]
+        spin += alphas[:, channel, None] * swept[:, :, None, :]
+        direct[channel], spin[channel] = 0.0, 0.0
     left, right = [1, 2, 0], [2, 0, 1]
-    return np.asarray(direct - omega[:, left, None] * spin[:, right] - omega[:, right, None] * spin[:, left])
+    direct -= omega[:, left, None] * spin[:, :, right]
+    direct -= omega[:, right, None] * spin[:, :, left]
+    return direct
+
+
+def rebuilt_response(
+    problem: Problem, channel: int, omega: FloatArray, patterns: FloatArray, turned: FloatArray
+) -> FloatArray:
+    """(9,n,p) change of the rebuilt channel along `patterns`: δy_c = row_i f + ω_k (v·A_i) ∫f + (v·ω) A_ki ∫f
+    (nap.closed_form), 0 for the channel itself."""
+    form, alphas = nap.closed_form(nap.CHANNELS[channel], problem.arms), nap.alpha_rows(problem.arms)
+    along, lead = form.direction @ alphas, alphas[form.axis]
+    sweep = along[:, None] * omega[:, form.axis] + lead[:, None] * (omega @ form.direction)
+    moved = form.row[:, None, None] * patterns + sweep[:, :, None] * turned
+    moved[channel] = 0.0
+    return np.asarray(moved)
 
 
 def fit_hypothesis(problem: Problem, channel: int | None) -> Hypothesis:
@@ -127,18 +160,19 @@ def fit_hypothesis(problem: Problem, channel: int | None) -> Hypothesis:
     whiten = whitener(problem, channel)
     observed = residual(problem, channel, problem.readings) @ whiten.T
     design = calibration_design(problem, channel, whiten)
-    return Hypothesis(channel, unexplained(design, observed.ravel()), observed.size, whiten, design)
+    cost = float(unexplained(design, observed.reshape(1, -1))[0])
+    return Hypothesis(channel, cost, observed.size, whiten, design)
 
 
 def calibration_design(problem: Problem, channel: int | None, whiten: FloatArray) -> FloatArray:
     """(n·m, p) whitened responses of the residual to one standard deviation of each calibration error."""
-    found = []
-    for column in range(9):
-        patterns = problem.patterns[column][:, problem.patterns[column].any(axis=0)]
-        if column != channel and patterns.size:
-            seen = np.einsum("mi,nip->nmp", whiten, response(problem, channel, column, patterns))
-            found.append(seen.reshape(-1, patterns.shape[1]))
-    return np.hstack(found) if found else np.zeros((len(problem.time) * len(whiten), 0))
+    seen = response(problem, channel, problem.patterns, problem.turned)
+    active = problem.patterns.any(axis=1)
+    if channel is not None:
+        active[channel] = False
+    columns = np.moveaxis(seen, 3, 1)[active]
+    seen_white = np.einsum("mi,pni->nmp", whiten, columns)
+    return seen_white.reshape(len(problem.time) * len(whiten), len(columns))
 
 
 def constraint_budget(problem: Problem) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -161,25 +195,20 @@ def limit_per_dof(dof: int, false_alarm: float = 1e-3) -> float:
     return 1.0 + MODEL_SLACK - float(ndtri(false_alarm)) * float(np.sqrt(2.0 / dof))
 
 
-def ridge(design: FloatArray, observed: FloatArray) -> FloatArray:
-    """θ (p,) of least ‖observed − Dθ‖² + ‖θ‖²."""
+def unexplained(design: FloatArray, signatures: FloatArray) -> FloatArray:
+    """λ = ‖(I − Π) s‖² of each row of `signatures` (q,n): the part that calibration errors within their priors
+    cannot imitate, min over θ of ‖s − Dθ‖² + ‖θ‖² = s·s − (Dᵀs)·(DᵀD + 1)⁻¹(Dᵀs), for `design` D (n,p)."""
     normal = design.T @ design + np.eye(design.shape[1])
-    return np.asarray(np.linalg.solve(normal, design.T @ observed))
+    seen = signatures @ design
+    return np.asarray((signatures**2).sum(axis=1) - (seen * np.linalg.solve(normal, seen.T).T).sum(axis=1))
 
 
-def unexplained(design: FloatArray, signature: FloatArray) -> float:
-    """λ = ‖(I − Π) s‖², the part of a signature that calibration errors within their priors cannot imitate."""
-    theta = ridge(design, signature)
-    left = signature - design @ theta
-    return float(left @ left + theta @ theta)
+def separations(problem: Problem, hypothesis: Hypothesis, pattern: FloatArray) -> FloatArray:
+    """(9,) λ = ‖(I − Π_k) S_j e‖²: how far a fault `pattern` (n,) in each channel stays visible under a hypothesis.
 
-
-def separation(problem: Problem, hypothesis: Hypothesis, fault: int, pattern: FloatArray) -> float:
-    """λ = ‖(I − Π_k) S_j e‖²: how far a fault `pattern` (n,) in column `fault` stays visible under a hypothesis.
-
-    0 when the hypothesis leaves that very channel free.
+    0 for the channel that the hypothesis leaves free.
     """
-    if fault == hypothesis.channel:
-        return 0.0
-    seen = response(problem, hypothesis.channel, fault, pattern[:, None])[:, :, 0]
-    return unexplained(hypothesis.design, (seen @ hypothesis.whiten.T).ravel())
+    patterns = np.broadcast_to(pattern[None, :, None], (9, len(pattern), 1))
+    turned = np.broadcast_to(kinematics.integrate(pattern, problem.time)[None, :, None], patterns.shape)
+    seen = response(problem, hypothesis.channel, patterns, turned)[:, :, :, 0] @ hypothesis.whiten.T
+    return unexplained(hypothesis.design, seen.reshape(9, -1))
