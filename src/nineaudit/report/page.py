@@ -49,7 +49,7 @@ MARKS = {
 }
 """A sign beside every verdict's word, so that neither colour nor sign alone has to carry it."""
 
-_LEAD = {
+LEAD = {
     "pass": "The recording passes every rule that applies to it.",
     "fail": "The recording breaks at least one rule of severity error.",
     "inconclusive": "The recording can neither be passed nor failed within the measurement uncertainty.",
@@ -75,11 +75,12 @@ def write_report(audit: Audit, path: str | Path) -> Path:
 
 def render(audit: Audit) -> str:
     """The report as a string of HTML."""
-    return _template().render(context(audit)) + "\n"
+    return template("report.html.j2").render(context(audit)) + "\n"
 
 
 @cache
-def _template() -> Template:
+def template(name: str) -> Template:
+    """A template of this package; what it is given is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -92,7 +93,7 @@ def _template() -> Template:
         finalize=lambda value: value if isinstance(value, Markup) else printable(value),
     )
     environment.filters["drawn"] = _drawn
-    return environment.get_template("report.html.j2")
+    return environment.get_template(name)
 
 
 def _drawn(figure: Figure) -> Any:
@@ -102,16 +103,22 @@ def _drawn(figure: Figure) -> Any:
     return Markup(figure.svg)
 
 
-def context(audit: Audit) -> dict[str, Any]:
-    """Everything that the template shows, as finished strings, lists of them, and figures."""
+def style() -> dict[str, Any]:
+    """The style sheet, and the policy that allows it and nothing else."""
     from markupsafe import Markup
 
     css = files("nineaudit.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    style = "\n" + css
-    digest = base64.b64encode(hashlib.sha256(style.encode("utf-8")).digest()).decode("ascii")
+    sheet = "\n" + css
+    digest = base64.b64encode(hashlib.sha256(sheet.encode("utf-8")).digest()).decode("ascii")
     return {
-        "css": Markup(style),
+        "css": Markup(sheet),
         "csp": f"default-src 'none'; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'",
+    }
+
+
+def context(audit: Audit) -> dict[str, Any]:
+    """Everything that the template shows, as finished strings, lists of them, and figures."""
+    return style() | {
         "marks": {str(verdict): mark for verdict, mark in MARKS.items()},
         "name": audit.recording.source.path.name,
         "banner": banner(audit),
@@ -139,7 +146,7 @@ def banner(audit: Audit) -> dict[str, Any]:
     return {
         "verdict": verdict,
         "label": verdict.replace("_", " "),
-        "lead": _LEAD[verdict],
+        "lead": LEAD[verdict],
         "power": tables.power(audit) if str(diagnosis.status) == "healthy" else "",
         "sentence": headline(diagnosis),
         "next": (

@@ -1,0 +1,5 @@
+"""``python -m nineaudit``."""
+
+from nineaudit.cli import main
+
+main()

@@ -1,0 +1,217 @@
+"""The command `check`: every recording is audited, whatever becomes of the others, and each output is written."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nineaudit.errors import ConfigurationError, NineauditError
+from nineaudit.outputs import each_its_own, make_folder, places, protect, unwritable, write_text
+
+if TYPE_CHECKING:
+    from nineaudit.auditing import Audit
+    from nineaudit.rig import Rig
+    from nineaudit.rulebook import Rulebook
+    from nineaudit.waivers import Waiver
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """One recording of a run: its `audit`, or the `error` for which it could not be audited."""
+
+    path: Path
+    audit: Audit | None = None
+    error: NineauditError | None = None
+
+    @property
+    def verdict(self) -> str:
+        return "not_audited" if self.audit is None else str(self.audit.verdict)
+
+    def document(self) -> dict[str, Any]:
+        """``nineaudit/result/1`` of the audit, or of the failure."""
+        from nineaudit.auditing import versions
+        from nineaudit.report import failure_document, result_document
+
+        if self.error is not None:
+            return failure_document(self.path, self.error, versions())
+        assert self.audit is not None
+        return result_document(self.audit)
+
+    def lines(self) -> list[str]:
+        """What the terminal shows."""
+        from nineaudit.report import lines
+
+        return [f"{self.path.name}: NOT AUDITED"] if self.audit is None else lines(self.audit)
+
+    def exit_code(self, fail_on: str) -> int:
+        """0 gate passed, 1 gate failed, 3 not audited."""
+        from nineaudit.engine import gate
+
+        if self.audit is None:
+            return 3
+        return 0 if gate(self.audit.findings, fail_on) else 1
+
+
+@dataclass(frozen=True)
+class Files:
+    """What `check` writes besides standard output. `html` and `json`: one for each recording, or none;
+    `json_list`: all results in one."""
+
+    html: tuple[Path, ...] = ()
+    json: tuple[Path, ...] = ()
+    json_list: Path | None = None
+    junit: Path | None = None
+    summary: Path | None = None
+
+    @property
+    def all(self) -> tuple[Path | None, ...]:
+        return (*self.html, *self.json, self.json_list, self.junit, self.summary)
+
+    @property
+    def collected(self) -> tuple[tuple[str, Path | None], ...]:
+        """(kind, file) of those that speak of all recordings."""
+        return (("json", self.json_list), ("junit", self.junit), ("markdown", self.summary))
+
+
+def files(
+    recordings: Sequence[Path],
+    inputs: Iterable[Path | None],
+    *,
+    html: str | None = None,
+    json: str | None = None,
+    junit: Path | None = None,
+    summary: Path | None = None,
+) -> Files:
+    """The files of the options. ConfigurationError: two outputs in one place, or an output in that of an input."""
+    one_list = json is not None and len(recordings) > 1 and not each_its_own(json)
+    made = Files(
+        html=places(html, recordings, "--html", ".html") if html else (),
+        json=places(json, recordings, "--json", ".json") if json and not one_list else (),
+        json_list=Path(json) if json and one_list else None,
+        junit=junit,
+        summary=summary,
+    )
+    protect(made.all, [*recordings, *inputs])
+    return made
+
+
+def load_book(rules: Path | None = None, select: str | None = None, ignore: str | None = None) -> Rulebook:
+    """The rules of a run, each held to its check. ConfigurationError: bad sheet, unknown code, limit that does not
+    fit the check."""
+    from nineaudit.engine import bind
+    from nineaudit.rulebook import load_rulebook
+
+    book = load_rulebook(rules, select, ignore)
+    bind(book)
+    return book
+
+
+def audit_each(
+    recordings: Iterable[Path],
+    rig: Rig,
+    rulebook: Rulebook,
+    waivers: Sequence[Waiver] | None = None,
+    dbc: Sequence[Path] = (),
+) -> Iterator[Outcome]:
+    """Audit one recording after the other. One that cannot be audited is an Outcome with its error and does not
+    stop the others; a ConfigurationError does, for it would come again with each of them."""
+    from nineaudit.auditing import audit
+    from nineaudit.readers import read
+
+    for path in recordings:
+        try:
+            yield Outcome(path, audit=audit(read(path, rig, dbc=dbc), rulebook, waivers=waivers))
+        except ConfigurationError:
+            raise
+        except NineauditError as error:
+            yield Outcome(path, error=error)
+
+
+def run(
+    outcomes: Iterable[Outcome],
+    files: Files,
+    *,
+    style: str,
+    fail_on: str,
+    many: bool,
+    show: Callable[[str], None],
+    say: Callable[[str], None],
+) -> int:
+    """Write the files, `show` the results in `style` (text, json, jsonl, junit, github), `say` the rest; exit code.
+
+    Outcomes are let go one by one, unless an output speaks of all of them.
+    """
+    streamed = style in ("text", "jsonl") or (style == "json" and not many)
+    kept: list[Outcome] = []
+    verdicts: Counter[str] = Counter()
+    code = 0
+    for i, outcome in enumerate(outcomes):
+        if outcome.error is not None:
+            say(str(outcome.error))
+        if streamed:
+            show(_styled(outcome, style))
+        _write_own(outcome, files, i)
+        if not streamed or any(file for _, file in files.collected):
+            kept.append(outcome)
+        verdicts[outcome.verdict] += 1
+        code = max(code, outcome.exit_code(fail_on))
+    if not streamed:
+        show(_collected(style, kept))
+    for kind, file in files.collected:
+        if file is not None:
+            write_text(file, _collected(kind, kept))
+    if many:
+        say(_tally(verdicts))
+    return code
+
+
+def write_page(audit: Audit, path: Path) -> None:
+    """Write the HTML report; its folder is made. ConfigurationError where that cannot be."""
+    from nineaudit.report import write_report
+
+    make_folder(path.parent)
+    try:
+        write_report(audit, path)
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def _write_own(outcome: Outcome, files: Files, i: int) -> None:
+    from nineaudit.report import to_json
+
+    if files.html and outcome.audit is not None:
+        write_page(outcome.audit, files.html[i])
+    if files.json:
+        write_text(files.json[i], to_json(outcome.document()))
+
+
+def _styled(outcome: Outcome, style: str) -> str:
+    from nineaudit.report import to_json, to_jsonl
+
+    if style == "text":
+        return "".join(f"{line}\n" for line in outcome.lines())
+    return (to_json if style == "json" else to_jsonl)(outcome.document())
+
+
+def _collected(kind: str, outcomes: Sequence[Outcome]) -> str:
+    """One text about all recordings: json (a list), junit, github or markdown."""
+    import json
+
+    from nineaudit import report
+
+    if kind == "json":
+        documents = [outcome.document() for outcome in outcomes]
+        return json.dumps(documents, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    audits = [outcome.audit for outcome in outcomes if outcome.audit is not None]
+    unread = {outcome.path: str(outcome.error) for outcome in outcomes if outcome.error is not None}
+    write = {"junit": report.junit, "github": report.github, "markdown": report.markdown}[kind]
+    return write(audits, unread)
+
+
+def _tally(verdicts: Mapping[str, int]) -> str:
+    """``12 recordings: 2 fail, 1 not audited, 9 pass``."""
+    parts = ", ".join(f"{n} {verdict.replace('_', ' ')}" for verdict, n in sorted(verdicts.items()))
+    return f"{sum(verdicts.values())} recordings: {parts}"

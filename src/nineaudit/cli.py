@@ -1,0 +1,221 @@
+"""The command line: arguments, exit codes, and the only place that prints.
+
+Exit codes: 0 gate passed; 1 findings at or above --fail-on; 2 wrong usage or configuration; 3 a recording could not
+be audited; 70 a defect of nineaudit. Results go to standard output, everything else to standard error. What a command
+needs is imported in it: ``nineaudit --help`` answers in 0.3 s.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import Annotated, NoReturn, TypeVar
+
+import typer
+
+from nineaudit.errors import NineauditError
+from nineaudit.options import Dbc, Force, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
+from nineaudit.reference import rig_app, rules_app
+
+DEFECT = 70
+"""Exit code of an error that is not the user's (EX_SOFTWARE of sysexits.h)."""
+
+FailOn = StrEnum("FailOn", ["error", "warning", "never"])
+Format = StrEnum("Format", ["text", "json", "jsonl", "junit", "github"])
+T = TypeVar("T")
+
+app = group(pretty_exceptions_enable=False)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"nineaudit {version('nineaudit')}")
+        raise typer.Exit
+
+
+@app.callback(epilog=example("nineaudit demo"))
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> None:
+    """Quality audit of recordings of rigid-body sensor arrays: names the faulty channel, or says which ones cannot
+    be told apart.
+
+    Exit codes: 0 gate passed, 1 findings at or above --fail-on, 2 wrong usage or configuration, 3 a recording could
+    not be audited, 70 a defect of nineaudit.
+    """
+
+
+@app.command(epilog=example("nineaudit check T0001.csv --rig rig.toml --html T0001.html"))
+def check(
+    recordings: Recordings,
+    rig: RigOption,
+    dbc: Dbc = None,
+    rules: Rules = None,
+    select: Annotated[str | None, typer.Option(metavar="CODES", help="Only these rules: RB301,RQ")] = None,
+    ignore: Annotated[str | None, typer.Option(metavar="CODES", help="Not these rules: ZO,RQ203")] = None,
+    waivers: Annotated[Path | None, typer.Option(metavar="W.toml", help="Violations that were accepted.")] = None,
+    fail_on: Annotated[FailOn, typer.Option(help="Findings for which the exit code is 1.")] = FailOn.error,
+    format: Annotated[Format, typer.Option(help="Of standard output.")] = Format.text,
+    html: Annotated[
+        str | None, typer.Option(metavar="F", help="Write the report; of several: a folder, or {stem}.html")
+    ] = None,
+    json: Annotated[
+        str | None, typer.Option(metavar="F", help="Write the result; of several: a list, a folder, or {stem}.json")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="F", help="Write JUnit XML.")] = None,
+    summary: Annotated[Path | None, typer.Option(metavar="F.md", help="Write a summary in Markdown.")] = None,
+) -> None:
+    """Audit recordings: which rules hold, which channel is at fault, what that does to the results."""
+    from nineaudit import checking
+    from nineaudit.rig import load_rig
+    from nineaudit.waivers import load_waivers
+
+    instrument, book = load_rig(rig), checking.load_book(rules, select, ignore)
+    accepted = None if waivers is None else load_waivers(waivers, checking.load_book(rules).codes)
+    inputs = (rig, waivers, *(dbc or instrument.dbc))
+    files = checking.files(recordings, inputs, html=html, json=json, junit=junit, summary=summary)
+    outcomes = checking.audit_each(recordings, instrument, book, accepted, dbc or ())
+    code = checking.run(
+        _progress(outcomes, len(recordings)),
+        files,
+        style=format,
+        fail_on=fail_on,
+        many=len(recordings) > 1,
+        show=partial(typer.echo, nl=False),
+        say=_say,
+    )
+    raise typer.Exit(code)
+
+
+@app.command(epilog=example("nineaudit repair T0001.csv --rig rig.toml --output repaired.csv"))
+def repair(
+    recording: Recording,
+    rig: RigOption,
+    output: Output,
+    channel: Annotated[str | None, typer.Option(metavar="NAME", help="Default: the one that is isolated.")] = None,
+    reason: Annotated[str, typer.Option(metavar="TEXT", help="Why, for the provenance.")] = "",
+    by: Annotated[str, typer.Option(metavar="NAME", help="Who, for the provenance.")] = "",
+    dbc: Dbc = None,
+    force: Force = False,
+) -> None:
+    """Rebuild the faulty channel into a new file, with its provenance beside it. The original stays as it is."""
+    from nineaudit import commands
+    from nineaudit.outputs import protect
+    from nineaudit.rig import load_rig
+
+    instrument = load_rig(rig)
+    protect([output], [recording, rig, *(dbc or instrument.dbc)])
+    audit = commands.audit_one(recording, instrument, dbc or ())
+    _print(commands.repaired(audit, output, channel=channel, reason=reason, by=by, dbc=dbc or (), force=force))
+
+
+@app.command(
+    epilog=example(
+        "nineaudit simulate rig.toml --motion general --output healthy.csv",
+        "nineaudit simulate rig.toml --motion general --fault a1y:clipping=0.5 \\",
+        "    --output T0001.csv",
+    )
+)
+def simulate(
+    rig: RigFile,
+    motion: Annotated[str, typer.Option(metavar="NAME", help="alem, sled, drop, planar, oblique, general, ...")],
+    output: Output,
+    fault: Annotated[
+        list[str] | None, typer.Option(metavar="CHANNEL:FAULT[=VALUE][@TIME]", help="May be repeated.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of noise and imperfections.")] = 0,
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Samples per second.")] = 10_000.0,
+    duration: Annotated[float | None, typer.Option(metavar="S", help="Default: the motion's own.")] = None,
+    dbc: Dbc = None,
+    force: Force = False,
+) -> None:
+    """Write a recording of a known motion, with the rig's noise and imperfections, and with faults if wanted."""
+    from nineaudit import commands
+    from nineaudit.outputs import protect
+    from nineaudit.rig import load_rig
+
+    instrument = load_rig(rig)
+    protect([output], [rig, *(dbc or instrument.dbc)])
+    made = commands.simulated(instrument, motion, fault or (), seed=seed, rate=rate, duration=duration)
+    _print(commands.written(made, output, dbc or (), force))
+
+
+@app.command(epilog=example("nineaudit report result.json --html result.html"))
+def report(
+    result: Annotated[Path, typer.Argument(metavar="RESULT.json", help="What `check --json` wrote.")],
+    html: Annotated[Path, typer.Option(metavar="F", help="The page.")],
+) -> None:
+    """Show a result as an HTML page. It is without curves, which are in the recording: see `check --html`."""
+    from nineaudit.outputs import protect, write_text
+    from nineaudit.report.result_page import render_result
+
+    protect([html], [result])
+    write_text(html, render_result(result))
+    _print([str(html)])
+
+
+@app.command(epilog=example("nineaudit demo"))
+def demo(
+    output: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Empty or new folder; default: nineaudit-demo, -2, -3, ...")
+    ] = None,
+) -> None:
+    """Simulate a recording with one clipped channel, check it, repair it, report it, in a fresh folder."""
+    from nineaudit import demo as demonstration
+
+    _print(demonstration.run(demonstration.fresh_folder(output)))
+
+
+for name, reference in (("rules", rules_app), ("rig", rig_app)):
+    app.add_typer(reference, name=name, result_callback=typer.echo)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run a command and exit with its code. An error is a sentence; with --debug, a traceback."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in given
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a redirected stream on Windows has not all characters
+            stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="replace")
+    try:
+        app([argument for argument in given if argument != "--debug"], prog_name="nineaudit")
+    except NineauditError as error:
+        if debug:
+            raise
+        _say(str(error))
+        sys.exit(error.exit_code)
+    except Exception as error:  # the last place that can turn a defect into a sentence
+        if debug:
+            raise
+        said = f"{type(error).__name__}: {error}"
+        _say(f"a defect of nineaudit: {said}; run it again with --debug, and report what it shows")
+        sys.exit(DEFECT)
+    sys.exit(0)
+
+
+def _print(lines: Iterable[str]) -> None:
+    for line in lines:
+        typer.echo(line)
+
+
+def _say(text: str) -> None:
+    typer.echo(f"nineaudit: {text}", err=True)
+
+
+def _progress(items: Iterable[T], total: int) -> Iterable[T]:
+    """The items, with a bar on the terminal where there are several of them and nothing else is written to it."""
+    if total < 2 or not sys.stderr.isatty() or sys.stdout.isatty():
+        return items
+    from rich.console import Console
+    from rich.progress import track
+
+    return track(items, "recordings", total=total, console=Console(stderr=True), transient=True)

@@ -1,0 +1,83 @@
+"""Where the files of a command go, and that none of them takes the place of an input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+from nineaudit.errors import ConfigurationError
+
+STEM: Final = "{stem}"
+
+
+def each_its_own(pattern: str) -> bool:
+    """Whether an output option names a file for each recording: a folder, or ``{stem}`` in the name."""
+    return STEM in pattern or pattern.endswith(("/", "\\")) or Path(pattern).is_dir()
+
+
+def places(pattern: str, recordings: Sequence[Path], option: str, suffix: str) -> tuple[Path, ...]:
+    """Where the output of each recording goes. ConfigurationError when two would go to one file."""
+    if not each_its_own(pattern):
+        if len(recordings) > 1:
+            raise ConfigurationError(
+                "one file for several recordings",
+                place=option,
+                found=pattern,
+                expected="a folder, or {stem} in the name",
+                advice=f"for example {option} reports/{STEM}{suffix}",
+            )
+        return (Path(pattern),)
+    name = pattern if STEM in pattern else str(Path(pattern) / f"{STEM}{suffix}")
+    found = tuple(Path(name.replace(STEM, path.stem)) for path in recordings)
+    for i, place in enumerate(found):
+        if place in found[:i]:
+            clash = f"{recordings[found.index(place)]} and {recordings[i]} would both be written to it"
+            raise ConfigurationError(clash, file=place, place=option)
+    return found
+
+
+def protect(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
+    """ConfigurationError when an output is one of the inputs, or another output."""
+    originals = [path for path in inputs if path is not None]
+    seen: list[Path] = []
+    for place in (path for path in outputs if path is not None):
+        if any(_same(place, original) for original in originals):
+            raise ConfigurationError("an input is never written to", file=place, advice="choose another name")
+        if any(_same(place, other) for other in seen):
+            raise ConfigurationError("two outputs would be written to it", file=place, advice="choose two names")
+        seen.append(place)
+
+
+def require_absent(path: Path, force: bool) -> None:
+    """ConfigurationError when the file exists and is not to be overwritten."""
+    if path.exists() and not force:
+        raise ConfigurationError(
+            "the file exists", file=path, advice="choose another name, or overwrite it with --force"
+        )
+
+
+def make_folder(path: Path) -> None:
+    """The folder of an output. ConfigurationError where it cannot be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8; its folder is made. ConfigurationError where that cannot be."""
+    make_folder(path.parent)
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def unwritable(path: Path, error: OSError) -> ConfigurationError:
+    """The error of a place that the system does not let us write to."""
+    return ConfigurationError(f"cannot be written: {error.strerror or error}", file=path)
+
+
+def _same(a: Path, b: Path) -> bool:
+    return a.resolve() == b.resolve() or (a.exists() and b.exists() and a.samefile(b))
