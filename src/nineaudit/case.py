@@ -117,11 +117,6 @@ class Case:
         changed[:, columns] = readings + self.zero[columns]
         return Case(replace(self.recording, readings=changed, valid=np.isfinite(changed)))
 
-    @property
-    def trusted(self) -> FloatArray:
-        """(n,k) zeroed readings less the samples that their own trace shows to be wrong (NaN there)."""
-        return np.where(self.flagged, np.nan, self.readings)
-
     @cached_property
     def condensed(self) -> condense.Condensed:
         """All readings as block means, nearly independent and at most 2000."""
@@ -129,8 +124,15 @@ class Case:
 
     @cached_property
     def parity(self) -> parity.Residual:
-        """Residual of every channel against the array, on the blocks of `condensed`, flagged samples left out."""
-        blocks = self._condense(self.trusted)
+        """Residual of every channel against the array, on the blocks of `condensed`, all samples at their word."""
+        return self._parity(self.condensed)
+
+    @cached_property
+    def trusted_parity(self) -> parity.Residual:
+        """The same without the samples that their own trace shows to be wrong."""
+        return self._parity(self._condense(np.where(self.flagged, np.nan, self.readings)))
+
+    def _parity(self, blocks: condense.Condensed) -> parity.Residual:
         motion = self._motion_of(self.array, blocks)
         return parity.channel_residuals(self.array, blocks.time, blocks.readings, blocks.sigma, motion)
 
@@ -179,6 +181,8 @@ class Case:
 
     @cached_property
     def nap_layout(self) -> tuple[tuple[int, ...], FloatArray] | None:
-        """Columns (9,) and arms (3,) of an ideal 3-2-2-2 inside the array, None where it has none."""
+        """Columns (9,) and arms (3,) where the accelerometers are an ideal 3-2-2-2 and no more, else None."""
+        if self.array.is_accelerometer.sum() != len(nap.CHANNELS):
+            return None
         found = nap.layout(self.array)
         return None if found is None else (tuple(int(c) for c in found[0]), np.asarray(found[1], dtype=float))

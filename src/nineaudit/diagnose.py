@@ -79,7 +79,7 @@ def diagnose(case: Case, evidence: Mapping[str, str] | None = None) -> Diagnosis
     evidence = evidence or {}
     problem = case.nap_problem
     if problem is None:
-        return _of_parity(case)
+        return _of_parity(case, evidence)
     free = tuple(closed_form.fit_hypothesis(problem, k) for k in range(9))
     return _of_closed_forms(ClosedFormFit(problem, case.nap_healthy, free), evidence)
 
@@ -190,16 +190,32 @@ def _where(fit: ClosedFormFit, channel: int) -> tuple[float, float]:
     return (float(time[out[0]]), float(time[out[-1]])) if len(out) else (float(time[0]), float(time[-1]))
 
 
-def _of_parity(case: Case) -> Diagnosis:
-    """An array of another layout: healthy when every parity residual keeps within its budget, else undiagnosed."""
+def _of_parity(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
+    """An array of another layout. Healthy when every parity residual keeps within its budget; the channels that
+    their own trace shows to be wrong are named when the array agrees with itself without those samples."""
     if sum(parity.redundancy(case.array)) == 0:
         reason = "the array has no redundancy: rigid-body constraints cannot show a fault in any channel"
         return Diagnosis(Status.UNDIAGNOSED, (), (), reason)
-    worst = parity.worst(case.parity, 1e-3)
-    ratio = worst.value / worst.limit
-    shared = {"healthy_statistic": ratio, "limit": 1.0}
-    if ratio <= 1.0:
-        reason = f"every channel agrees with the array: the worst residual is {ratio:.2f} of its limit"
+    whole = _parity_ratio(case.parity)
+    shared = {"healthy_statistic": whole, "limit": 1.0}
+    if whole <= 1.0:
+        reason = f"every channel agrees with the array: the worst residual is {whole:.2f} of its limit"
         return Diagnosis(Status.HEALTHY, (), (), reason, **shared)
-    reason = f"the array contradicts itself: the worst residual is {ratio:.3g} times its limit"
-    return Diagnosis(Status.UNDIAGNOSED, (), (), reason, **shared)
+    contradiction = f"the array contradicts itself: the worst residual is {whole:.3g} times its limit"
+    if not evidence:
+        return Diagnosis(Status.UNDIAGNOSED, (), (), contradiction, **shared)
+    without = _parity_ratio(case.trusted_parity)
+    candidates = tuple(Candidate((c,), word, 1.0, without) for c, word in evidence.items())
+    if without > 1.0:
+        reason = f"{contradiction}, {without:.3g} times it without the samples that their own trace shows wrong"
+        return Diagnosis(Status.UNDIAGNOSED, (), candidates, reason, **shared)
+    reason = (
+        f"{contradiction}; without the samples that their own trace shows wrong ({', '.join(evidence)}) it agrees: "
+        f"{without:.2f} of the limit"
+    )
+    return Diagnosis(Status.ISOLATED, tuple(evidence), candidates, reason, **shared)
+
+
+def _parity_ratio(residual: parity.Residual) -> float:
+    worst = parity.worst(residual, 1e-3)
+    return worst.value / worst.limit

@@ -160,7 +160,9 @@ def fit_hypothesis(problem: Problem, channel: int | None) -> Hypothesis:
     whiten = whitener(problem, channel)
     observed = residual(problem, channel, problem.readings) @ whiten.T
     design = calibration_design(problem, channel, whiten)
-    cost = float(unexplained(design, observed.reshape(1, -1))[0])
+    seen = observed.ravel()
+    theta = np.linalg.solve(design.T @ design + np.eye(design.shape[1]), design.T @ seen)
+    cost = float(np.sum((seen - design @ theta) ** 2) + theta @ theta)
     return Hypothesis(channel, cost, observed.size, whiten, design)
 
 
@@ -200,7 +202,8 @@ def unexplained(design: FloatArray, signatures: FloatArray) -> FloatArray:
     cannot imitate, min over θ of ‖s − Dθ‖² + ‖θ‖² = s·s − (Dᵀs)·(DᵀD + 1)⁻¹(Dᵀs), for `design` D (n,p)."""
     normal = design.T @ design + np.eye(design.shape[1])
     seen = signatures @ design
-    return np.asarray((signatures**2).sum(axis=1) - (seen * np.linalg.solve(normal, seen.T).T).sum(axis=1))
+    explained = (seen * np.linalg.solve(normal, seen.T).T).sum(axis=1)
+    return np.asarray(np.maximum((signatures**2).sum(axis=1) - explained, 0.0))
 
 
 def separations(problem: Problem, hypothesis: Hypothesis, pattern: FloatArray) -> FloatArray:

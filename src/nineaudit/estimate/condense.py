@@ -25,17 +25,21 @@ class Condensed:
     length: int
 
 
+SLOWEST_BLOCKS = 1500.0
+"""Blocks a second that a head impact needs: products of ω must not change within a block."""
 ENOUGH_BLOCKS = 8
 """Fewest blocks of rest from which the noise of a block is measured (pooled over the channels)."""
 
 
 def block_length(samples: int, rate: float, pass_band: float | None, most: int = 2000) -> int:
-    """Samples to a block: about 2.5 blocks a period of `pass_band` (Hz), at most `most` blocks in all.
+    """Samples to a block. `rate` and `pass_band` (None: unfiltered) in Hz.
 
-    The first keeps noise of neighbouring blocks nearly independent; the second bounds the work.
+    About 2.5 blocks a period of the pass band keep the noise of neighbouring blocks nearly independent. Longer
+    ones, down to SLOWEST_BLOCKS, bound the work to about `most` blocks.
     """
     coloured = rate / (2.5 * pass_band) if pass_band else 1.0
-    return max(1, round(coloured), -(-samples // most))
+    bounded = min(-(-samples // most), rate / SLOWEST_BLOCKS)
+    return max(1, round(coloured), int(bounded))
 
 
 def block_means(values: FloatArray, length: int) -> FloatArray:

@@ -63,17 +63,22 @@ def flat_tops(
     or more and the evidence reaches ln(1/false_alarm); a level within `rail_tolerance` (relative) of the full
     scale, or beyond it, needs less.
     """
+    at = np.flatnonzero(np.isfinite(values))  # invalid samples neither end a stretch nor belong to one
+    if at.size < 8 * shortest:
+        return ()
+
+    def moving_at(start: int, stop: int) -> bool:
+        return moving(int(at[start]), int(at[stop - 1]) + 1)
+
     found = []
     for sign in (1.0, -1.0):
-        signal = sign * np.where(np.isfinite(values), values, np.nan)
-        if np.isfinite(signal).sum() < 8 * shortest:
-            continue
-        top = float(np.nanmax(signal))
+        signal = sign * values[at]
+        top = float(signal.max())
         at_rail = full_scale is not None and abs(top) >= (1.0 - rail_tolerance) * full_scale
         needed = np.log(1.0 / false_alarm) - (RAIL_NATS if at_rail else 0.0)
-        best = _best_width(signal, top, noise, moving, shortest, at_rail)
+        best = _best_width(signal, top, noise, moving_at, shortest, at_rail)
         if best is not None and best[1] >= needed:
-            stretches = tuple(Stretch(s.start, s.stop, sign * top, s.nats) for s in best[0])
+            stretches = tuple(Stretch(int(at[s.start]), int(at[s.stop - 1]) + 1, sign * top, s.nats) for s in best[0])
             found.append(FlatTop(sign * top, stretches, best[1], at_rail))
     return tuple(found)
 
@@ -82,15 +87,15 @@ def _best_width(
     signal: FloatArray, top: float, noise: float, moving: Moving, shortest: int, at_rail: bool
 ) -> tuple[tuple[Stretch, ...], float] | None:
     """The most convincing of the three widths: its stretches and their evidence."""
-    step = max(resolution(signal), 1e-9 * float(np.nanmax(signal) - np.nanmin(signal)))
-    cap = min(NATS_PER_SAMPLE, float(np.log(np.unique(signal[np.isfinite(signal)]).size)))
+    step = max(resolution(signal), 1e-9 * float(np.ptp(signal)))
+    cap = min(NATS_PER_SAMPLE, float(np.log(np.unique(signal).size)))
     best: tuple[tuple[Stretch, ...], float] | None = None
     for near_width, width, noisy in (
         (0.0, step, False),
         (4 * step, 4 * step, False),
         (5 * noise, 5 * max(noise, step), True),
     ):
-        if width <= 0.0 or top - np.nanmin(signal) < 3.0 * WIDER * width:
+        if width <= 0.0 or top - signal.min() < 3.0 * WIDER * width:
             continue
         near = signal >= top - near_width - 1e-12 * abs(top)
         flats = [
@@ -116,9 +121,8 @@ def _flat_stretches(signal: FloatArray, near: BoolArray, top: float, width: floa
             continue
         members = np.flatnonzero(near[a:b]) + a
         drop = top - max(signal[a - 1], signal[b])
-        if np.isfinite(drop):
-            nats = max(0, n - 1 - (m - n)) * min(float(np.log(drop / width)), cap)
-            yield Stretch(int(members[0]), int(members[-1]) + 1, top, nats)
+        nats = max(0, n - 1 - (m - n)) * min(float(np.log(drop / width)), cap)
+        yield Stretch(int(members[0]), int(members[-1]) + 1, top, nats)
 
 
 def _inside(starts: IntArray, stops: IntArray, n: int) -> tuple[IntArray, IntArray]:

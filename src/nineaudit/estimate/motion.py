@@ -8,7 +8,7 @@ L[H Q] = [0 I 0] is used, Padgaonkar's for a 3-2-2-2 array, and ω = ω(0) + ∫
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,12 +22,16 @@ OFF_IDEAL = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Body-frame `omega` rad/s, `alpha` rad/s², `a0` m/s² at the array's origin, each (n,3); `method` in words."""
+    """Body-frame `omega` rad/s, `alpha` rad/s², `a0` m/s² at the array's origin, each (n,3); `method` in words.
+
+    `known` (n,): False where ω was bridged because too few rate sensors were valid; None: all of it is known.
+    """
 
     omega: FloatArray
     alpha: FloatArray
     a0: FloatArray
     method: str
+    known: BoolArray | None = None
 
 
 def bridge(readings: FloatArray, time: FloatArray) -> FloatArray:
@@ -83,8 +87,9 @@ def estimate_motion(
     positions, axes = array.positions[accelerometers], array.axes[accelerometers]
     if has_rates(array):
         valid = np.isfinite(readings[:, gyros])
-        omega = bridge(rates_omega(array.axes[gyros], readings[:, gyros], sigma[gyros], valid), time)
-        return _with_accelerations(omega, positions, axes, readings[:, accelerometers], time)
+        measured = rates_omega(array.axes[gyros], readings[:, gyros], sigma[gyros], valid)
+        found = _with_accelerations(bridge(measured, time), positions, axes, readings[:, accelerometers], time)
+        return replace(found, known=np.isfinite(measured).all(axis=1))
     combination = rigid_body.product_free_alpha(positions, axes, leak=OFF_IDEAL)
     if rest_index is None:
         raise EstimationError(

@@ -42,7 +42,7 @@ def channel_residuals(
     """Residual of every channel against the whole array, with its error budget.
 
     `readings` (n,k) SI zeroed (NaN invalid), `sigma` (k,) noise, `motion` from the same readings. A sample with
-    an invalid channel is NaN in every channel it takes part with. Channels without redundancy are NaN.
+    an invalid channel is NaN in every channel it takes part with, and so is one at which ω is not known. Channels without redundancy are NaN.
     """
     accelerometers = np.flatnonzero(array.is_accelerometer)
     gyros = np.flatnonzero(~array.is_accelerometer)
@@ -56,6 +56,8 @@ def channel_residuals(
         projector = _projector(rigid_body.design(positions, axes))
         y = readings[:, accelerometers] - rigid_body.centripetal(positions, axes, motion.omega)
         value[:, accelerometers] = y @ projector.T
+        if motion.known is not None:
+            value[np.ix_(~motion.known, accelerometers)] = np.nan
         noise[accelerometers] = np.sqrt(projector**2 @ sigma[accelerometers] ** 2)
         variance[:, accelerometers] = _accelerometer_budget(array, time, motion, patterns, projector, sigma)
     if spare_g > 0:

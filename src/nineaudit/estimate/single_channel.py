@@ -26,9 +26,10 @@ from nineaudit.estimate.evidence import (
 from nineaudit.estimate.flat_tops import FlatTop, flat_tops
 from nineaudit.recording import Recording, Trace
 
-DEAD_FACTOR = 50.0
-"""How far, in steps or noise, another channel of the same kind must scatter before one that never changes in the
-whole record is called dead: with a good alignment a planar motion may leave a coarse channel at one code."""
+DEAD_FACTOR = 16.0
+"""Times how much more than usual (three steps or noise deviations) another channel of the same kind must scatter
+before one that never changes in the whole record is called dead: about 50 steps, of which a misalignment of one
+degree shows one. In a planar motion, a coarse channel may well stay at one code."""
 
 
 @dataclass(frozen=True)
