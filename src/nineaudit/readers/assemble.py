@@ -60,7 +60,7 @@ def _origin(traces: Sequence[Trace]) -> tuple[float, tuple[str, ...]]:
     """What is taken from all stamps, and the note that says so: dates are counted from the first of them."""
     starts = [float(trace.time[0]) for trace in traces if trace.time.size]
     first = min(starts, default=0.0)
-    if first <= EPOCH_S:
+    if abs(first) <= EPOCH_S:
         return 0.0, ()
     return first, (f"time stamps are dates; they are counted from the first, {first!r} s",)
 

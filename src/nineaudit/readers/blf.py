@@ -48,11 +48,11 @@ def scan(data: bytes) -> Scan:
     try:
         for content in _containers(data, start):
             stream += content
+        if len(data) < size:
+            raise _Damage(f"{len(data)} of {size} bytes are there", len(data))
         objects, markers = _objects(bytes(stream))
     except _Damage as damage:
         return Scan(damage=str(damage), place=damage.place)
-    if len(data) < size:
-        return Scan(damage=f"{len(data)} of {size} bytes are there", place=f"byte {len(data)}")
     notes = (f"the header counts {stated} objects, {objects} are there",) if stated != objects else ()
     return Scan(objects, tuple(markers), notes=notes)
 

@@ -12,7 +12,7 @@ from nineaudit.recording import Clock
 
 GAP: Final = 1.5
 """Sampling intervals beyond which two samples have a gap between them."""
-_UNSTEADY: Final = 0.1  # jitter, in intervals, beyond which single intervals do not show the sampling rate
+_UNSTEADY: Final = 0.1  # of an interval: intervals that differ by less are alike
 _STRIDE: Final = 32
 _JITTER_REACH: Final = 5.0  # standard deviations of an interval: what jitter alone does not do
 _NEIGHBOURS: Final = 4  # samples on both sides of a gap that must make up for it where nothing is lost
@@ -83,13 +83,21 @@ def _furthest(interval: float, jitter: float) -> float:
 def _interval(time: FloatArray) -> tuple[float, float]:
     """(sampling interval, robust standard deviation of the intervals) in s.
 
-    The median interval. Where stamps jitter (frames of a bus that wait for each other, or come in batches) single
-    intervals are skewed; then a median over many intervals at once, which adds their errors only once.
+    Single intervals show the rate only as well as stamps are resolved (a date in floating-point seconds: 0.24 µs);
+    so the median of many intervals at once, of those stretches where all are alike. Where stamps jitter (frames wait
+    for the bus, or come in batches) no intervals are alike, and all stretches count.
     """
     steps = np.diff(time)
     interval = float(np.median(steps))
-    jitter = _MAD_TO_SD * float(np.median(np.abs(steps - interval)))
-    if jitter > _UNSTEADY * interval and time.size > 4 * _STRIDE:
-        interval = float(np.median(time[_STRIDE:] - time[:-_STRIDE])) / _STRIDE
-        jitter = _MAD_TO_SD * float(np.median(np.abs(steps - interval)))
-    return interval, jitter
+    jitter = _deviation(steps, interval)
+    stride = min(_STRIDE, time.size // 4)
+    if stride > 1:
+        odd = (np.abs(steps - interval) > _UNSTEADY * interval) & (jitter <= _UNSTEADY * interval)
+        before = np.r_[0, np.cumsum(odd)]
+        spans = (time[stride:] - time[:-stride])[before[stride:] == before[:-stride]]
+        interval = float(np.median(spans)) / stride if spans.size else interval
+    return interval, _deviation(steps, interval)
+
+
+def _deviation(steps: FloatArray, interval: float) -> float:
+    return _MAD_TO_SD * float(np.median(np.abs(steps - interval)))

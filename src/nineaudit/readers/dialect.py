@@ -31,7 +31,7 @@ class Dialect:
                 yield number, line.decode()
 
     def cells(self, line: str) -> list[str]:
-        return next(csv.reader([line], delimiter=self.separator), [])
+        return next(csv.reader([line], delimiter=self.separator, skipinitialspace=True), [])
 
 
 def detect(
@@ -44,11 +44,11 @@ def detect(
 
     Raises RecordingError: not UTF-8 (names the byte), no header row, no rows below it.
     """
-    data = data.removeprefix(_BOM)
     _require_text(data, path)
+    data = data.removeprefix(_BOM)
     line, number, end = _header(data, path)
     separator = separator or _separator(line, wanted)
-    names = tuple(name.strip() for name in next(csv.reader([line], delimiter=separator)))
+    names = tuple(name.strip() for name in next(csv.reader([line], delimiter=separator, skipinitialspace=True)))
     if all(_is_number(name) for name in names):
         raise RecordingError(
             "no header row: the first line holds numbers",
@@ -64,21 +64,19 @@ def detect(
 
 
 def _require_text(data: bytes, path: Path) -> None:
-    place, advice = data.find(b"\0"), "save the table as UTF-8 text"
-    if place < 0:
-        try:
-            data.decode("utf-8")
-        except UnicodeDecodeError as error:
-            place = error.start
-        else:
-            return
-    raise RecordingError(
-        "not text in UTF-8",
-        file=path,
-        place=f"byte {place}",
-        found=f"0x{data[place]:02X}",
-        advice=advice,
-    )
+    try:
+        data.decode("utf-8")
+        place = data.find(b"\0")
+    except UnicodeDecodeError as error:
+        place = error.start
+    if place >= 0:
+        raise RecordingError(
+            "not text in UTF-8",
+            file=path,
+            place=f"byte {place}",
+            found=f"0x{data[place]:02X}",
+            advice="save the table as UTF-8 text",
+        )
 
 
 def _header(data: bytes, path: Path) -> tuple[str, int, int]:
@@ -94,7 +92,7 @@ def _header(data: bytes, path: Path) -> tuple[str, int, int]:
 
 def _separator(header: str, wanted: set[str]) -> str:
     def score(separator: str) -> tuple[int, int]:
-        cells = [cell.strip() for cell in next(csv.reader([header], delimiter=separator))]
+        cells = [cell.strip() for cell in next(csv.reader([header], delimiter=separator, skipinitialspace=True))]
         return len(wanted.intersection(cells)), len(cells)
 
     return max(SEPARATORS, key=score)
