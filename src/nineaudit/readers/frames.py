@@ -58,7 +58,7 @@ class _Lines(io.StringIO):
 
     at = 0
 
-    def __next__(self) -> str:
+    def __next__(self) -> str:  # type: ignore[override]  # typeshed has bytes for every stream
         self.at += 1
         return super().__next__()
 

@@ -116,7 +116,7 @@ def _block(block: Sequence[tuple[Sensor, BusSignal, FloatArray]], time: FloatArr
     are can only be written as a floating-point NaN."""
     message = block[0][1].message
     invalid = np.array([np.isnan(values) for _, _, values in block])
-    sent = ~invalid.all(axis=0)
+    sent = np.asarray(~invalid.all(axis=0), dtype=np.bool_)
     payload = np.zeros((time.size, _frame_length(message)), dtype=np.uint8)
     for (sensor, signal, values), lost in zip(block, invalid, strict=True):
         alone = np.flatnonzero(lost & sent)
