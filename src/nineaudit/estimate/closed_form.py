@@ -192,9 +192,9 @@ MODEL_SLACK = 0.15
 
 def limit_per_dof(dof: int, false_alarm: float = 1e-3) -> float:
     """Largest cost per degree of freedom of a hypothesis that holds: χ² by its normal limit, plus MODEL_SLACK."""
-    from scipy.special import ndtri
+    from statistics import NormalDist
 
-    return 1.0 + MODEL_SLACK - float(ndtri(false_alarm)) * float(np.sqrt(2.0 / dof))
+    return 1.0 + MODEL_SLACK - NormalDist().inv_cdf(false_alarm) * float(np.sqrt(2.0 / dof))
 
 
 def unexplained(design: FloatArray, signatures: FloatArray) -> FloatArray:

@@ -81,9 +81,9 @@ class Worst:
 
 def budget_factor(false_alarm: float, count: int) -> float:
     """How many standard deviations `count` residuals of a healthy array exceed once in 1/`false_alarm` records."""
-    from scipy.special import ndtri
+    from statistics import NormalDist
 
-    return float(-ndtri(false_alarm / (2.0 * max(count, 1))))
+    return -NormalDist().inv_cdf(false_alarm / (2.0 * max(count, 1)))
 
 
 def worst(residual: Residual, false_alarm: float) -> Worst:
