@@ -8,6 +8,7 @@ needs is imported in it: ``nineaudit --help`` answers in 0.3 s.
 from __future__ import annotations
 
 import io
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
@@ -181,6 +182,7 @@ for name, reference in (("rules", rules_app), ("rig", rig_app)):
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit with its code. An error is a sentence; with --debug, a traceback."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrices are small: threads would wait for each other
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
     for stream in (sys.stdout, sys.stderr):
