@@ -24,10 +24,28 @@ def peak_alpha_error(readings, truth, arms):
     return np.abs(alpha - truth.alpha).max() / np.linalg.norm(truth.alpha, axis=1).max()
 
 
+def test_takhounts_clipping_with_a_perfect_calibration():
+    """METHODS.md 7.4: 0.3 g noise, no calibration error: χ²/dof 1.05 to 1.14 for the right channel; the error of peak α
+    54 to 100 % before and 5 to 7 % after the repair. The next hypothesis was ≥ 413 without slow noise in the fit."""
+    certain = dict.fromkeys(("u_gain", "u_zero", "u_alignment", "u_position", "u_timing"), 0.0)
+    rig = replace(RIG, array=SensorArray(tuple(replace(s, **certain) for s in RIG.array.sensors)))
+    for seed, channel in ((0, "a1y"), (3, "a2z"), (4, "a3x"), (3, "a0x")):
+        found = simulate(rig, "general", faults=[f"{channel}:clipping=0.5"], seed=seed, imperfect=False)
+        result = audit(found.recording)
+        assert result.diagnosis.channels == (channel,)
+        best, following = result.diagnosis.candidates[:2]
+        assert 0.85 < best.statistic < 1.14
+        assert following.statistic > 10 * best.statistic
+        arms, mended = np.array([0.05, 0.055, 0.06]), found.recording.readings - result.case.zero
+        assert peak_alpha_error(mended, found.truth, arms) > 0.54
+        mended[:, [RIG.array.index(channel)]] = result.reconstruction.repaired
+        assert peak_alpha_error(mended, found.truth, arms) < 0.10
+
+
 @pytest.mark.parametrize("channel", ["a1y", "a2z", "a3x"])
-def test_takhounts_clipping_in_general_motion(channel):
-    """METHODS.md 7.4: the right channel is named, its cost is near 1 and the next one's is not, and the error of
-    peak α returns from tens of per cent to the noise floor."""
+def test_takhounts_clipping_with_the_rigs_calibration_errors(channel):
+    """0.5 % gain, 0.5°, 0.5 mm, 0.1 g: the right channel is still named, its cost is near 1, and the error of peak α
+    returns from tens of per cent to the noise floor."""
     found = simulate(RIG, "general", faults=[f"{channel}:clipping=0.5"], seed=12)
     result = audit(found.recording)
     diagnosis = result.diagnosis
@@ -37,7 +55,7 @@ def test_takhounts_clipping_in_general_motion(channel):
     assert best.fault == "clipping"
     assert best.probability > 0.99
     assert 0.85 < best.statistic < 1.15
-    assert following.statistic > 1.25
+    assert following.statistic - best.statistic > 0.1
     arms = np.array([0.05, 0.055, 0.06])
     zero = result.case.zero
     mended = found.recording.readings - zero

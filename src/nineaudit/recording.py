@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.rig import Rig
 
@@ -80,8 +78,8 @@ class Recording:
 
     @property
     def rate(self) -> float:
-        """Samples per second of the common time base, from the median interval."""
-        return float(1.0 / np.median(np.diff(self.time)))
+        """Samples per second of the common time base: that of the fastest clock."""
+        return max(clock.rate for clock in self.clocks)
 
     def column(self, channel: str) -> FloatArray:
         """(n,) readings of one channel, SI."""

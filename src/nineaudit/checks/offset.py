@@ -7,10 +7,11 @@ At rest α = ω = 0, so all accelerometers feel the same vector a0 and all rate 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from nineaudit.array import FloatArray
+from nineaudit.array import BoolArray, FloatArray
 from nineaudit.case import Case
 from nineaudit.estimate.quiet import Quiet, noise_level, quiet_end
 from nineaudit.finding import COVERAGE_FACTOR, Measure, NotApplicable
@@ -56,22 +57,51 @@ def zero_before(case: Case, *, offset_sd: float, full_scale_part: float) -> Sequ
     ]
 
 
-def _departures(case: Case, mean: FloatArray) -> FloatArray:
-    """(k,) what no common a0 explains in means at rest: accelerometers less n·a0, rate sensors as they are.
+@dataclass(frozen=True, eq=False)
+class Departures:
+    """What no common a0 explains in means at rest: `value` (k,), NaN where no other channel determines it, and
+    `share` (k,k) its response to an offset of each channel."""
 
-    Each accelerometer is compared with the others only (leave-one-out), so that one bad channel cannot drag a0
-    towards itself: y_i − ŷ_(−i) = e_i/(1 − h_ii), NaN where no other determines it.
+    value: FloatArray
+    share: FloatArray
+
+
+def _departures(case: Case, mean: FloatArray, u: FloatArray, budget_sd: float) -> Departures:
+    """Accelerometers against the a0 of the *others*, y_i − n_i·â0 (without i); rate sensors as they are.
+
+    One bad channel drags the a0 of all that it takes part in. The worst is therefore set aside, while it exceeds
+    `budget_sd` of its budget from the offsets `u` (k,) and those that stay still check one another; what was set
+    aside is measured against those that stay.
     """
-    out = mean.copy()
-    held = np.flatnonzero(case.array.is_accelerometer & np.isfinite(mean))
-    axes = case.array.axes[held]
-    if not len(held):
-        return out
-    hat = axes @ np.linalg.pinv(axes)
-    free = 1.0 - np.diag(hat)
-    residual = mean[held] - hat @ mean[held]
-    out[held] = np.where(free > 1e-6, residual / np.maximum(free, 1e-6), np.nan)
-    return out
+    trusted = case.array.is_accelerometer & np.isfinite(mean)
+    while True:
+        found = _against(case, mean, trusted)
+        excess = np.abs(found.value) / np.sqrt(found.share**2 @ u**2 + 1e-300)
+        excess = np.where(trusted & np.isfinite(excess), excess, 0.0)
+        worst = int(np.argmax(excess))
+        fewer = trusted & (np.arange(len(mean)) != worst)
+        if excess[worst] <= budget_sd or not _redundant(case.array.axes[fewer], case.array.axes[worst]):
+            return found
+        trusted = fewer
+
+
+def _redundant(axes: FloatArray, axis: FloatArray) -> bool:
+    """Whether sensors of `axes` (m,3) check one another in the direction of `axis` (3,)."""
+    leverage = axis @ np.linalg.pinv(axes)
+    return bool(np.linalg.norm(axis - leverage @ axes) < 1e-6 and (np.abs(leverage) > 0.1).sum() > 1)
+
+
+def _against(case: Case, mean: FloatArray, trusted: BoolArray) -> Departures:
+    """Departures from the a0 of the `trusted` (k,) accelerometers, each without itself."""
+    count, axes = len(mean), case.array.axes
+    value, share = mean.copy(), np.eye(count)
+    for i in np.flatnonzero(case.array.is_accelerometer):
+        others = np.flatnonzero(trusted & (np.arange(count) != i))
+        weights = axes[i] @ np.linalg.pinv(axes[others]) if len(others) else np.zeros(0)
+        determined = len(others) > 0 and np.linalg.norm(axes[i] - weights @ axes[others]) < 1e-6
+        share[i, others] = -weights
+        value[i] = mean[i] - weights @ mean[others] if determined else np.nan
+    return Departures(value, share)
 
 
 def same_axis_agreement(case: Case, *, budget_sd: float) -> Sequence[Measure] | NotApplicable:
@@ -80,24 +110,37 @@ def same_axis_agreement(case: Case, *, budget_sd: float) -> Sequence[Measure] | 
     Budget of a departure: its own and the others' zero offsets, and their tilt and gain against gravity.
     """
     rest = case.required_rest
-    mean = _mean(case.recording.readings, rest)
-    departure = _departures(case, mean)
-    sensors = case.array.sensors
-    u = [np.hypot(s.u_zero, G0 * np.hypot(s.u_alignment, s.u_gain)) for s in sensors]
-    checked = [i for i, s in enumerate(sensors) if s.kind == "accelerometer" and np.isfinite(departure[i])]
-    if not checked:
+    u = _allowed(case, G0)
+    found = _departures(case, _mean(case.recording.readings, rest), u, budget_sd)
+    checked = np.flatnonzero(case.array.is_accelerometer & np.isfinite(found.value))
+    if not len(checked):
         return NotApplicable("no two accelerometers sense the same direction")
-    return [
-        _departure_measure(case, i, departure[i], np.array(u), _u_mean(case, rest), rest, budget_sd)
-        for i in checked
-    ]
+    spread = _u_mean(case, rest)
+    return [_measure(case, i, found.value[i], found.share[i], u, spread, rest, budget_sd) for i in checked]
 
 
-def _departure_measure(
-    case: Case, i: int, departure: float, u: FloatArray, spread: FloatArray, quiet: Quiet, budget_sd: float
+def _allowed(case: Case, gravity: float) -> FloatArray:
+    """(k,) offset a healthy channel may show at rest: its zero, and `gravity` seen through its tilt and gain."""
+    return np.array(
+        [
+            np.hypot(s.u_zero, gravity * np.hypot(s.u_alignment, s.u_gain) * (s.kind == "accelerometer"))
+            for s in case.array.sensors
+        ]
+    )
+
+
+def _measure(
+    case: Case,
+    i: int,
+    departure: float,
+    share: FloatArray,
+    u: FloatArray,
+    spread: FloatArray,
+    quiet: Quiet,
+    budget_sd: float,
 ) -> Measure:
     """Departure of channel `i` against the offsets `u` (k,) allowed to all; `spread` (k,) of the means."""
-    share, sensor = _departure_shares(case)[i], case.array.sensors[i]
+    sensor = case.array.sensors[i]
     noise = float(np.sqrt(share**2 @ spread**2))
     return Measure(
         value=float(abs(departure)),
@@ -109,16 +152,11 @@ def _departure_measure(
     )
 
 
-def _departure_shares(case: Case) -> FloatArray:
-    """(k,k) response of each departure to an offset of each channel."""
-    return np.nan_to_num(np.stack([_departures(case, e) for e in np.eye(len(case.array))], axis=1))
-
-
 def zero_after(case: Case, *, budget_sd: float) -> Sequence[Measure] | NotApplicable:
     """ZO102: has the zero moved during the event? Departures at the end of the record less those before it.
 
-    Only where the record ends at rest; gravity, which the head may now feel in another direction, is common to
-    the accelerometers and drops out. A channel that no other checks at rest (its direction alone) is left out.
+    Only where the record ends at rest; gravity, which the head may now feel in another direction (by up to 2 g),
+    is common to the accelerometers and drops out. A channel that no other checks at rest is left out.
     """
     rest, end = case.required_rest, quiet_end(case.time, case.recording.readings, case.sigma)
     if end is None or end.start < rest.stop:
@@ -127,17 +165,13 @@ def zero_after(case: Case, *, budget_sd: float) -> Sequence[Measure] | NotApplic
     reach = float(np.linalg.norm(case.array.positions - case.array.positions.mean(axis=0), axis=1).max())
     if reach * turning**2 > float(np.median(case.array.values("u_zero")[case.array.is_accelerometer])):
         return NotApplicable(f"the body seems to turn at {turning:.3g} rad/s at the end of the record")
-    before, after = (_departures(case, _mean(case.recording.readings, q)) for q in (rest, end))
+    u = _allowed(case, 2.0 * G0)
+    before, after = (_mean(case.recording.readings, q) for q in (rest, end))
+    found = _departures(case, after - before, u, budget_sd)
     spread = np.hypot(_u_mean(case, rest), _u_mean(case, end))
-    sensors = case.array.sensors
-    # what is left of the stated zero, and gravity turned by up to 2 g seen through tilt and gain
-    turned = [2.0 * G0 * np.hypot(s.u_alignment, s.u_gain) * (s.kind == "accelerometer") for s in sensors]
-    u = np.hypot([s.u_zero for s in sensors], turned)
-    moved = after - before
     return [
-        _departure_measure(case, i, moved[i], u, spread, end, budget_sd)
-        for i in range(len(sensors))
-        if np.isfinite(moved[i])
+        _measure(case, i, found.value[i], found.share[i], u, spread, end, budget_sd)
+        for i in np.flatnonzero(np.isfinite(found.value))
     ]
 
 
@@ -151,8 +185,9 @@ def drift(case: Case, *, budget_sd: float) -> Sequence[Measure] | NotApplicable:
     t = case.time[rest.samples] - case.time[rest.samples].mean()
     values = np.nan_to_num(case.readings[rest.samples])
     ahead = float(case.time[-1] - rest.t_start)
-    moved = np.abs(t @ values) / (t @ t) * ahead
-    u = noise_level(case.recording.readings, rest.samples) / np.sqrt(t @ t) * ahead
+    slope = (t @ values) / (t @ t)
+    left = noise_level(values - t[:, None] * slope, slice(None))
+    moved, u = np.abs(slope) * ahead, left / np.sqrt(t @ t) * ahead
     allowed = budget_sd * case.array.values("u_zero")
     telling = (COVERAGE_FACTOR * u < allowed) & np.isfinite(case.readings[rest.samples]).any(axis=0)
     if not telling.any():
