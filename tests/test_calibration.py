@@ -45,10 +45,7 @@ def test_columns_are_the_derivatives_of_the_reading(channel, moving):
         1: y + step,
         2: reading(replace(sensor, axis=sensor.axis + step * across[0]), motion),
         3: reading(replace(sensor, axis=sensor.axis + step * across[1]), motion),
-        **{
-            4 + j: reading(replace(sensor, position=sensor.position + step * np.eye(3)[j]), motion)
-            for j in range(3)
-        },
+        **{4 + j: reading(replace(sensor, position=sensor.position + step * np.eye(3)[j]), motion) for j in range(3)},
     }
     scale = np.abs(columns).max(axis=0)
     for j, value in changed.items():

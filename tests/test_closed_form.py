@@ -30,9 +30,7 @@ def test_response_is_the_derivative_of_the_residual(problem, hypothesis):
         for p in range(2):
             moved = np.zeros_like(problem.readings)
             moved[:, column] = step * patterns[column, :, p]
-            up, down = (
-                closed_form.residual(problem, hypothesis, problem.readings + s * moved) for s in (1, -1)
-            )
+            up, down = (closed_form.residual(problem, hypothesis, problem.readings + s * moved) for s in (1, -1))
             expected = (up - down) / (2 * step)
             scale = max(np.abs(expected).max(), 1e-12)
             assert np.abs(found[column, :, :, p] - expected).max() < 1e-8 * scale
@@ -129,9 +127,7 @@ def test_fault_in_the_free_channel_is_invisible(problem):
         spoiled = problem.readings.copy()
         spoiled[:, hypothesis] = np.random.default_rng(0).standard_normal(len(problem.time)) * 1e3
         again = closed_form.fit_hypothesis(
-            closed_form.Problem(
-                problem.names, problem.time, spoiled, problem.sigma, problem.patterns, problem.arms
-            ),
+            closed_form.Problem(problem.names, problem.time, spoiled, problem.sigma, problem.patterns, problem.arms),
             hypothesis,
         )
         assert again.cost == pytest.approx(fit.cost, rel=1e-12)

@@ -69,9 +69,7 @@ def test_turning_the_body_frame_changes_nothing(preset):
     found = simulated(preset, seed=4)
     turn = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
     array = found.recording.rig.array
-    turned = SensorArray(
-        tuple(replace(s, position=turn @ s.position, axis=turn @ s.axis) for s in array.sensors)
-    )
+    turned = SensorArray(tuple(replace(s, position=turn @ s.position, axis=turn @ s.axis) for s in array.sensors))
     readings, sigma, time = found.recording.readings, np.ones(len(array)), found.truth.time
     before = parity.channel_residuals(array, time, readings, sigma, estimate_motion(array, time, readings, sigma))
     after = parity.channel_residuals(turned, time, readings, sigma, estimate_motion(turned, time, readings, sigma))

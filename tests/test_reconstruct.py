@@ -123,10 +123,10 @@ def test_repair_refuses_what_it_must(clipped, tmp_path):
     result = audit(read(clipped, RIG))
     output = tmp_path / "repaired.csv"
     output.write_text("precious")
-    with pytest.raises(ConfigurationError, match="the file exists.*--force"):
+    with pytest.raises(ConfigurationError, match=r"the file exists.*--force"):
         repair(result, output)
     assert output.read_text() == "precious"
-    with pytest.raises(ConfigurationError, match="no such channel.*a9z"):
+    with pytest.raises(ConfigurationError, match=r"no such channel.*a9z"):
         repair(result, tmp_path / "x.csv", channel="a9z")
     healthy = audit(simulate(RIG, "general", seed=1).recording)
     with pytest.raises(ConfigurationError, match="nothing to repair"):

@@ -82,9 +82,7 @@ class Audit:
             return None
         columns, arms = self.case.nap_layout
         index = list(columns)
-        full = nap.constraint_residuals(
-            bridge(self.case.readings[:, index], self.case.time), arms, self.case.time
-        )
+        full = nap.constraint_residuals(bridge(self.case.readings[:, index], self.case.time), arms, self.case.time)
         _, noise, budget = closed_form.constraint_budget(problem)
         rows = nap.product_rows(arms) ** 2 @ self.case.sigma[index] ** 2
         time, calibration = self.case.time, np.maximum(budget**2 - noise**2, 0.0)

@@ -14,7 +14,8 @@ import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray, SensorArray
 from nineaudit.errors import EstimationError
-from nineaudit.estimate import budget, closed_form, condense, parity
+from nineaudit.estimate import budget, closed_form, condense
+from nineaudit.estimate import parity as parity_of
 from nineaudit.estimate.motion import Motion, bridge, estimate_motion
 from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
 from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
@@ -123,18 +124,18 @@ class Case:
         return self._condense(self.readings)
 
     @cached_property
-    def parity(self) -> parity.Residual:
+    def parity(self) -> parity_of.Residual:
         """Residual of every channel against the array, on the blocks of `condensed`, all samples at their word."""
         return self._parity(self.condensed)
 
     @cached_property
-    def trusted_parity(self) -> parity.Residual:
+    def trusted_parity(self) -> parity_of.Residual:
         """The same without the samples that their own trace shows to be wrong."""
         return self._parity(self._condense(np.where(self.flagged, np.nan, self.readings)))
 
-    def _parity(self, blocks: condense.Condensed) -> parity.Residual:
+    def _parity(self, blocks: condense.Condensed) -> parity_of.Residual:
         motion = self._motion_of(self.array, blocks)
-        return parity.channel_residuals(self.array, blocks.time, blocks.readings, blocks.sigma, motion)
+        return parity_of.channel_residuals(self.array, blocks.time, blocks.readings, blocks.sigma, motion)
 
     @cached_property
     def alpha_budget(self) -> budget.AlphaBudget:

@@ -9,7 +9,7 @@ well are a group; no name is given inside it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -88,17 +88,10 @@ def _of_closed_forms(fit: ClosedFormFit, evidence: Mapping[str, str]) -> Diagnos
     healthy = fit.healthy.statistic
     limit = closed_form.limit_per_dof(fit.healthy.dof)
     detectable, isolable = _smallest(fit)
-    shared = {
-        "smallest_detectable": detectable,
-        "smallest_isolable": isolable,
-        "healthy_statistic": healthy,
-        "limit": limit,
-    }
+    sizes = Diagnosis(Status.HEALTHY, (), (), "", detectable, isolable, healthy, limit)
     if healthy <= limit:
-        reason = (
-            f"the constraints hold within the budget: {healthy:.2f} per degree of freedom, limit {limit:.2f}"
-        )
-        return Diagnosis(Status.HEALTHY, (), (), reason, **shared)
+        reason = f"the constraints hold within the budget: {healthy:.2f} per degree of freedom, limit {limit:.2f}"
+        return replace(sizes, reason=reason)
     candidates = _candidates(fit, evidence)
     holding = [k for k in range(9) if fit.free[k].statistic <= closed_form.limit_per_dof(fit.free[k].dof)]
     if not holding:
@@ -107,16 +100,16 @@ def _of_closed_forms(fit: ClosedFormFit, evidence: Mapping[str, str]) -> Diagnos
             f"the constraints fail ({healthy:.3g} per degree of freedom, limit {limit:.2f}) and no single channel "
             f"mends them: at best {best.statistic:.3g} without {best.channels[0]}"
         )
-        return Diagnosis(Status.UNDIAGNOSED, (), candidates, reason, **shared)
+        return replace(sizes, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
     group = _group(fit, holding)
     names = tuple(fit.names[k] for k in group)
-    where = _where(fit, group[0])
+    named = replace(sizes, channels=names, candidates=candidates, interval=_where(fit, group[0]))
     without = f"{fit.free[group[0]].statistic:.2f} without, {healthy:.3g} with it (limit {limit:.2f})"
     if len(group) == 1:
         reason = f"only without {names[0]} do the constraints hold: {without} per degree of freedom"
-        return Diagnosis(Status.ISOLATED, names, candidates, reason, interval=where, **shared)
+        return replace(named, status=Status.ISOLATED, reason=reason)
     reason = f"the constraints hold without any one of {', '.join(names)}; this motion cannot tell them apart"
-    return Diagnosis(Status.AMBIGUOUS, names, candidates, reason, interval=where, **shared)
+    return replace(named, status=Status.AMBIGUOUS, reason=reason)
 
 
 def _group(fit: ClosedFormFit, holding: list[int]) -> list[int]:
@@ -152,7 +145,8 @@ def _smallest(fit: ClosedFormFit) -> tuple[dict[str, float], dict[str, float]]:
     np.fill_diagonal(rivals, np.inf)
     slack = SEPARATION + closed_form.MODEL_SLACK * fit.free[0].dof / 3.0
     with np.errstate(divide="ignore"):
-        detectable, isolable = np.sqrt(needed / seen), np.sqrt(slack / rivals.min(axis=0))
+        detectable = np.sqrt(needed / seen)
+        isolable = np.maximum(np.sqrt(slack / rivals.min(axis=0)), detectable)
     names = fit.names
     return dict(zip(names, detectable.tolist(), strict=True)), dict(zip(names, isolable.tolist(), strict=True))
 
@@ -167,9 +161,7 @@ def _candidates(fit: ClosedFormFit, evidence: Mapping[str, str]) -> tuple[Candid
     weight /= weight.sum()
     order = np.argsort(-score, kind="stable")
     return tuple(
-        Candidate(
-            (fit.names[k],), evidence.get(fit.names[k], "unknown"), float(weight[k]), fit.free[k].statistic
-        )
+        Candidate((fit.names[k],), evidence.get(fit.names[k], "unknown"), float(weight[k]), fit.free[k].statistic)
         for k in order
     )
 
@@ -197,23 +189,23 @@ def _of_parity(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
         reason = "the array has no redundancy: rigid-body constraints cannot show a fault in any channel"
         return Diagnosis(Status.UNDIAGNOSED, (), (), reason)
     whole = _parity_ratio(case.parity)
-    shared = {"healthy_statistic": whole, "limit": 1.0}
+    sizes = Diagnosis(Status.UNDIAGNOSED, (), (), "", healthy_statistic=whole, limit=1.0)
     if whole <= 1.0:
         reason = f"every channel agrees with the array: the worst residual is {whole:.2f} of its limit"
-        return Diagnosis(Status.HEALTHY, (), (), reason, **shared)
+        return replace(sizes, status=Status.HEALTHY, reason=reason)
     contradiction = f"the array contradicts itself: the worst residual is {whole:.3g} times its limit"
     if not evidence:
-        return Diagnosis(Status.UNDIAGNOSED, (), (), contradiction, **shared)
+        return replace(sizes, reason=contradiction)
     without = _parity_ratio(case.trusted_parity)
     candidates = tuple(Candidate((c,), word, 1.0, without) for c, word in evidence.items())
     if without > 1.0:
         reason = f"{contradiction}, {without:.3g} times it without the samples that their own trace shows wrong"
-        return Diagnosis(Status.UNDIAGNOSED, (), candidates, reason, **shared)
+        return replace(sizes, candidates=candidates, reason=reason)
     reason = (
         f"{contradiction}; without the samples that their own trace shows wrong ({', '.join(evidence)}) it agrees: "
         f"{without:.2f} of the limit"
     )
-    return Diagnosis(Status.ISOLATED, tuple(evidence), candidates, reason, **shared)
+    return replace(sizes, status=Status.ISOLATED, channels=tuple(evidence), candidates=candidates, reason=reason)
 
 
 def _parity_ratio(residual: parity.Residual) -> float:

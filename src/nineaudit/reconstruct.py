@@ -95,7 +95,7 @@ def _uncertainty(case: Case, problem: closed_form.Problem, rebuilt: FloatArray, 
     calibration = np.interp(case.time, problem.time, (moved**2).sum(axis=(0, 2)))
     columns, _ = nap_columns(case)
     row = nap.closed_form(nap.CHANNELS[missing], problem.arms).row
-    return np.sqrt(calibration + row**2 @ case.sigma[columns] ** 2)
+    return np.asarray(np.sqrt(calibration + row**2 @ case.sigma[columns] ** 2))
 
 
 def nap_columns(case: Case) -> tuple[list[int], FloatArray]:

@@ -62,6 +62,7 @@ class UnitNames(Protocol):
 
 
 _SI_OF: dict[str, Quantity] = {"m/s^2": "acceleration", "rad/s": "angular_rate", "m": "length"}
+_COUNTED = ("samples", "frames", "spikes")
 _SPELLED = {"g_0": "g", "1": "", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "rad/s^3": "rad/s³"}
 
 
@@ -80,6 +81,8 @@ def display(value: float, unit: str, names: UnitNames, significant: int = 3) -> 
     """``12.4 g``: a value in an SI (or any other) `unit` with its unit, as the rig speaks."""
     number, name = in_rig_units(value, unit, names)
     spelled = _SPELLED.get(name, name)
-    whole = name == "samples" or (float(number).is_integer() and abs(number) < 1e6)
-    text = f"{number:.0f}" if whole else f"{number:.{significant}g}"
+    if abs(number) == 1.0 and name in _COUNTED:
+        spelled = name.removesuffix("s")
+    whole = name in _COUNTED or (float(number).is_integer() and abs(number) < 1e6)
+    text = f"{number:.0f}" if whole or 1e3 <= abs(number) < 1e6 else f"{number:.{significant}g}"
     return f"{text} {spelled}" if spelled else text

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.metadata import entry_points
+from types import ModuleType
 
 from nineaudit.checks import budget, bus, clock, noise, offset, record, rigid_body
 from nineaudit.errors import ConfigurationError
@@ -17,15 +18,9 @@ from nineaudit.finding import Measure, NotApplicable
 
 Check = Callable[..., Measure | Sequence[Measure] | NotApplicable]
 
-CHECKS: dict[str, Check] = {
-    **clock.CHECKS,
-    **record.CHECKS,
-    **noise.CHECKS,
-    **bus.CHECKS,
-    **offset.CHECKS,
-    **rigid_body.CHECKS,
-    **budget.CHECKS,
-}
+_MODULES: tuple[ModuleType, ...] = (clock, record, noise, bus, offset, rigid_body, budget)
+CHECKS: dict[str, Check] = {code: check for module in _MODULES for code, check in module.CHECKS.items()}
+"""Of this package. Each module holds its own."""
 
 
 @cache

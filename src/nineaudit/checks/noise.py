@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nineaudit.array import FloatArray, Sensor
+from nineaudit.array import Sensor
 from nineaudit.case import Case
 from nineaudit.estimate.evidence import resolution
+from nineaudit.estimate.quiet import Quiet
 from nineaudit.finding import Measure, NotApplicable
 from nineaudit.recording import Trace
 
@@ -19,8 +20,8 @@ FEWEST = 8
 def noise_level(case: Case, *, max_ratio: float) -> Sequence[Measure] | NotApplicable:
     """RQ205: standard deviation at rest against `max_ratio` times the stated noise.
 
-    A straight line is taken off first, since slow drift is another rule's affair. u = s/√(2(n−2)), the standard
-    uncertainty of a standard deviation of n samples about a line (GUM E.4.3), for independent samples.
+    u = s/√(2(n−2)), the standard uncertainty of a standard deviation of n independent samples about a line
+    (GUM E.4.3).
     """
     stated = [s for s in case.array.sensors if s.noise is not None]
     if not stated:
@@ -29,8 +30,7 @@ def noise_level(case: Case, *, max_ratio: float) -> Sequence[Measure] | NotAppli
     traces = {trace.channel: trace for trace in case.recording.native}
     out = []
     for sensor in stated:
-        window, count = _at_rest(traces[sensor.channel], rest.t_start, rest.t_end)
-        level = np.nan if count < FEWEST else float(np.sqrt(np.sum(window**2) / (count - 2)))
+        level, count = _scatter(traces[sensor.channel], rest)
         out.append(
             Measure(
                 value=level,
@@ -50,10 +50,11 @@ def quantisation(case: Case, *, max_ratio: float) -> Sequence[Measure]:
     out = []
     for sensor, sigma, trace in zip(case.array.sensors, case.sigma, _in_order(case), strict=True):
         step = resolution(trace.values)
+        noise = float(sigma) if sigma > 1e-6 * step else 0.0  # less is rounding of the arithmetic
         out.append(
             Measure(
                 value=step / float(np.sqrt(12.0)),
-                limit=max_ratio * float(sigma),
+                limit=max_ratio * noise,
                 unit=_unit(sensor),
                 channels=(sensor.channel,),
                 detail="noise of rounding",
@@ -62,15 +63,23 @@ def quantisation(case: Case, *, max_ratio: float) -> Sequence[Measure]:
     return out
 
 
-def _at_rest(trace: Trace, start: float, end: float) -> tuple[FloatArray, int]:
-    """Finite samples of a trace between two times, less their straight line, and how many there are."""
-    inside = (trace.time >= start) & (trace.time <= end) & np.isfinite(trace.values)
+def _scatter(trace: Trace, rest: Quiet) -> tuple[float, int]:
+    """Noise standard deviation of a trace at rest, NaN where too few samples tell it; and how many do.
+
+    About a straight line, since slow drift is another rule's affair. Where the interval was found, not stated,
+    the body may still stir: then the root mean square second difference over √6 if that is smaller, which slow
+    movement hardly raises.
+    """
+    inside = (trace.time >= rest.t_start) & (trace.time <= rest.t_end) & np.isfinite(trace.values)
     time, values = trace.time[inside], trace.values[inside]
     if values.size < FEWEST:
-        return values, int(values.size)
+        return float("nan"), int(values.size)
     design = np.stack([np.ones_like(time), time - time.mean()], axis=1)
-    fitted = design @ np.linalg.lstsq(design, values, rcond=None)[0]
-    return values - fitted, int(values.size)
+    residual = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
+    scatter = np.sqrt(np.sum(residual**2) / (values.size - 2))
+    if not rest.stated:
+        scatter = min(scatter, np.sqrt(np.mean(np.diff(values, n=2) ** 2) / 6.0))
+    return float(scatter), int(values.size)
 
 
 def _in_order(case: Case) -> list[Trace]:

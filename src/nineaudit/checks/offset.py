@@ -31,7 +31,7 @@ def _mean(values: FloatArray, quiet: Quiet) -> FloatArray:
 
 def _u_mean(case: Case, quiet: Quiet) -> FloatArray:
     """(k,) standard uncertainty of a mean: sd/√N of the samples in it."""
-    return noise_level(case.recording.readings, quiet.samples) / np.sqrt(quiet.stop - quiet.start)
+    return np.asarray(noise_level(case.recording.readings, quiet.samples) / np.sqrt(quiet.stop - quiet.start))
 
 
 def zero_before(case: Case, *, offset_sd: float, full_scale_part: float) -> Sequence[Measure]:
@@ -112,8 +112,8 @@ def same_axis_agreement(case: Case, *, budget_sd: float) -> Sequence[Measure] | 
     rest = case.required_rest
     u = _allowed(case, G0)
     found = _departures(case, _mean(case.recording.readings, rest), u, budget_sd)
-    checked = np.flatnonzero(case.array.is_accelerometer & np.isfinite(found.value))
-    if not len(checked):
+    checked = np.flatnonzero(case.array.is_accelerometer & np.isfinite(found.value)).tolist()
+    if not checked:
         return NotApplicable("no two accelerometers sense the same direction")
     spread = _u_mean(case, rest)
     return [_measure(case, i, found.value[i], found.share[i], u, spread, rest, budget_sd) for i in checked]
@@ -171,7 +171,7 @@ def zero_after(case: Case, *, budget_sd: float) -> Sequence[Measure] | NotApplic
     spread = np.hypot(_u_mean(case, rest), _u_mean(case, end))
     return [
         _measure(case, i, found.value[i], found.share[i], u, spread, end, budget_sd)
-        for i in np.flatnonzero(np.isfinite(found.value))
+        for i in np.flatnonzero(np.isfinite(found.value)).tolist()
     ]
 
 

@@ -68,7 +68,9 @@ def whole_record(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
     if case.nap_problem is None:
         return NotApplicable("the array holds no ideal 3-2-2-2 layout; RB302 tests its general parity")
     healthy = case.nap_healthy
-    return Measure(healthy.statistic, closed_form.limit_per_dof(healthy.dof, false_alarm), "1")
+    return Measure(
+        healthy.statistic, closed_form.limit_per_dof(healthy.dof, false_alarm), "1", detail="cost per degree of freedom"
+    )
 
 
 CHECKS = {"RB301": constraint_equations, "RB302": array_parity, "RB303": whole_record}

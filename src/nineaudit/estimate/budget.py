@@ -57,14 +57,10 @@ def alpha_budget(
     combination = alpha_combination(array)
     size = np.linalg.norm(motion.alpha, axis=1)
     row = int(np.argmax(size))
-    patterns = calibration.all_columns(array, bridge(readings, time), time, motion)[
-        array.is_accelerometer, row
-    ]
+    patterns = calibration.all_columns(array, bridge(readings, time), time, motion)[array.is_accelerometer, row]
     reach = (combination**2).sum(axis=0)
     parts = {
-        source: float(
-            np.sqrt(sum(reach @ patterns[:, calibration.PARAMETERS.index(m)] ** 2 for m in members))
-        )
+        source: float(np.sqrt(sum(reach @ patterns[:, calibration.PARAMETERS.index(m)] ** 2 for m in members)))
         for source, members in _MEMBERS.items()
     }
     parts["noise"] = float(np.sqrt(reach @ sigma[array.is_accelerometer] ** 2))

@@ -47,9 +47,7 @@ def columns(sensor: Sensor, reading: FloatArray, time: FloatArray, motion: Motio
     if sensor.kind == "gyroscope":
         sensed = motion.omega
     else:
-        sensed = np.nan_to_num(
-            rigid_body.acceleration_at(sensor.position, motion.a0, motion.alpha, motion.omega)
-        )
+        sensed = np.nan_to_num(rigid_body.acceleration_at(sensor.position, motion.a0, motion.alpha, motion.omega))
         for j, e in enumerate(np.eye(3)):
             moved = rigid_body.acceleration_at(e, np.zeros_like(motion.a0), motion.alpha, motion.omega)
             out[:, 4 + j] = moved @ sensor.axis
@@ -60,6 +58,4 @@ def columns(sensor: Sensor, reading: FloatArray, time: FloatArray, motion: Motio
 
 def all_columns(array: SensorArray, readings: FloatArray, time: FloatArray, motion: Motion) -> FloatArray:
     """(k,n,8) of every channel, scaled to one standard deviation of each parameter (prior_sd)."""
-    return np.stack(
-        [columns(s, readings[:, i], time, motion) * prior_sd(s) for i, s in enumerate(array.sensors)]
-    )
+    return np.stack([columns(s, readings[:, i], time, motion) * prior_sd(s) for i, s in enumerate(array.sensors)])

@@ -139,7 +139,7 @@ def response(problem: Problem, channel: int | None, patterns: FloatArray, turned
     left, right = [1, 2, 0], [2, 0, 1]
     direct -= omega[:, left, None] * spin[:, :, right]
     direct -= omega[:, right, None] * spin[:, :, left]
-    return direct
+    return np.asarray(direct)
 
 
 def rebuilt_response(
@@ -169,12 +169,12 @@ def fit_hypothesis(problem: Problem, channel: int | None) -> Hypothesis:
 def calibration_design(problem: Problem, channel: int | None, whiten: FloatArray) -> FloatArray:
     """(n·m, p) whitened responses of the residual to one standard deviation of each calibration error."""
     seen = response(problem, channel, problem.patterns, problem.turned)
-    active = problem.patterns.any(axis=1)
+    active = np.asarray(problem.patterns.any(axis=1))
     if channel is not None:
         active[channel] = False
     columns = np.moveaxis(seen, 3, 1)[active]
     seen_white = np.einsum("mi,pni->nmp", whiten, columns)
-    return seen_white.reshape(len(problem.time) * len(whiten), len(columns))
+    return np.asarray(seen_white.reshape(len(problem.time) * len(whiten), len(columns)))
 
 
 def constraint_budget(problem: Problem) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -62,6 +62,6 @@ def block_noise(sigma: FloatArray, rest: FloatArray | None, length: int) -> Floa
     """
     white = sigma / np.sqrt(length)
     if rest is None or len(rest) // length < ENOUGH_BLOCKS:
-        return white
+        return np.asarray(white)
     ratio = np.nanvar(block_means(rest, length), axis=0, ddof=1) / white**2
     return np.asarray(white * np.sqrt(max(float(np.median(ratio)), 1.0)))

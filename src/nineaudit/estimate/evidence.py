@@ -100,29 +100,42 @@ def edge_slopes(values: FloatArray, start: int, stop: int, level: float) -> Floa
     return np.array(out) if np.all(np.isfinite(out)) else None
 
 
-def longest_by_chance(values: FloatArray, false_alarm: float, shortest: int) -> float:
-    """Longest run of identical values (samples) that a healthy channel has, with its own noise and resolution.
+BLOCK = 50
+"""Samples over which the part of repeated readings is counted."""
+FEWEST_BLOCKS = 2
+"""Blocks outside a run without which nothing is known of the channel's noise."""
+DITHERED = 0.7
+"""Part of repeated readings up to which noise, not resolution, makes the next reading."""
 
-    Of successive readings a part p is identical (runs longer than 20 left out, which a stuck channel would
-    add); a run of m then comes about n p^(m-1) times in n samples, so m = 1 + ln(n/false_alarm)/ln(1/p). Where
-    the channel is not dithered by its noise (p > 0.3) rest makes long runs, and the limit is three times the
-    second longest run. Never under `shortest`.
+
+def longest_by_chance(
+    values: FloatArray, run: tuple[int, int], false_alarm: float, shortest: int
+) -> tuple[float, bool]:
+    """Longest run of identical values (samples) that a healthy channel has, and whether its noise dithers it.
+
+    A part p of readings repeat the one before; a run of m then comes about n p^(m-1) times in n samples, so
+    m = 1 + ln(n/false_alarm)/ln(1/p). p is that of the stillest block of the record outside `run` (start, stop).
+    Without dither a smooth signal makes runs of any length at its turning points and at rest: then three times
+    the longest other run. Never under `shortest`.
     """
+    same = np.zeros(values.size, dtype=np.bool_)
+    same[1:] = values[1:] == values[:-1]
+    blocks = same[: values.size - values.size % BLOCK].reshape(-1, BLOCK).mean(axis=1)
+    at = np.arange(blocks.size) * BLOCK
+    outside = blocks[(at >= run[1]) | (at + BLOCK <= run[0])]
+    p = max(float(outside.max(initial=0.0)), 1.0 / BLOCK)
+    if p <= DITHERED and outside.size >= FEWEST_BLOCKS:
+        return float(max(np.ceil(1.0 + np.log(values.size / false_alarm) / -np.log(p)), shortest)), True
     starts, stops = constant_runs(values)
-    lengths = stops - starts
-    short = lengths[lengths <= 20]
-    pairs = short.sum()
-    p = (np.sum(short - 1) + 1.0) / (pairs + 2.0)
-    by_chance = 1.0 + np.log(max(values.size, 1) / false_alarm) / -np.log(p)
-    if p > 0.3 and lengths.size > 1:
-        by_chance = max(by_chance, 3.0 * float(np.sort(lengths)[-2]))
-    return float(max(np.ceil(by_chance), shortest))
+    others = (stops - starts)[starts != run[0]]
+    return float(max(3 * others.max(initial=0), shortest)), False
 
 
 def stuck(
     values: FloatArray,
     *,
     moving: Moving = always,
+    hurrying: Moving = always,
     excluded: BoolArray | None = None,
     false_alarm: float = 1e-6,
     shortest: int = 10,
@@ -130,18 +143,35 @@ def stuck(
     """Runs of one identical value that noise and resolution do not explain while the array moves, and the limit.
 
     `values` (n,) as recorded; `excluded` (n,) samples explained otherwise (flat tops, dropouts). Returns the
-    stretches and the longest run (samples) that counts as healthy. A channel that never changes has no noise to
-    compare with: it counts as stuck when the array moves.
+    stretches and the longest run (samples) that counts as healthy. Of a channel that its noise does not dither
+    (or that never changes at all) more is asked: the array must be `hurrying`, and the run begin and end
+    abruptly.
     """
-    limit = longest_by_chance(values, false_alarm, shortest)
     starts, stops = constant_runs(values)
-    long = stops - starts > limit
-    found = [
-        Stretch(int(a), int(b), float(values[a]))
-        for a, b in zip(starts[long], stops[long], strict=True)
-        if not (excluded is not None and excluded[a:b].any()) and moving(int(a), int(b))
-    ]
-    return tuple(found), limit
+    order = [int(i) for i in np.argsort(starts - stops)[:MOST_RUNS] if stops[i] - starts[i] > shortest]
+    found, limits = [], []
+    for i in order:
+        a, b = int(starts[i]), int(stops[i])
+        limit, dithered = longest_by_chance(values, (a, b), false_alarm, shortest)
+        limits.append(limit)
+        if b - a <= limit or (excluded is not None and excluded[a:b].any()):
+            continue
+        if moving(a, b) if dithered else (hurrying(a, b) and _abrupt(stops - starts, i)):
+            found.append(Stretch(a, b, float(values[a])))
+    return tuple(sorted(found, key=lambda s: s.start)), max(limits, default=float(shortest))
+
+
+MOST_RUNS = 20
+"""How many of a channel's longest runs are looked at."""
+
+
+def _abrupt(lengths: IntArray, i: int) -> bool:
+    """Whether run i is twenty times as long as each of the three runs on either side.
+
+    The longest run of a parabola is at most ten times its neighbour, of a fourth-order top at most eleven.
+    """
+    around = np.concatenate([lengths[max(i - 3, 0) : i], lengths[i + 1 : i + 4]])
+    return bool(lengths[i] >= 20 * around.max(initial=0))
 
 
 def dropouts(values: FloatArray, noise: float, *, shortest: int = 3) -> tuple[Stretch, ...]:

@@ -98,11 +98,14 @@ def _best_width(
         if width <= 0.0 or top - signal.min() < 3.0 * WIDER * width:
             continue
         near = signal >= top - near_width - 1e-12 * abs(top)
+        if not at_rail and _rests_there(signal >= top - WIDER * width, shortest):
+            continue
         flats = [
             s
             for s in _flat_stretches(signal, near, top, width, cap)
             if (not noisy or _structureless(signal[s.start : s.stop]))
             and _arrives(signal, s, top, noise, width, at_rail)
+            and (at_rail or not _eases(signal, s, top, width))
             and (at_rail or moving(s.start - 1, s.stop + 1))
         ]
         nats = sum(s.nats for s in flats)
@@ -123,6 +126,11 @@ def _flat_stretches(signal: FloatArray, near: BoolArray, top: float, width: floa
         drop = top - max(signal[a - 1], signal[b])
         nats = max(0, n - 1 - (m - n)) * min(float(np.log(drop / width)), cap)
         yield Stretch(int(members[0]), int(members[-1]) + 1, top, nats)
+
+
+def _rests_there(close: BoolArray, shortest: int) -> bool:
+    """Whether the record begins or ends at the level: then it is where the signal rests, not where it stops."""
+    return bool(close[:shortest].all() or close[-shortest:].all())
 
 
 def _inside(starts: IntArray, stops: IntArray, n: int) -> tuple[IntArray, IntArray]:
@@ -149,6 +157,35 @@ def _arrives(signal: FloatArray, s: Stretch, top: float, noise: float, width: fl
         return True
     edges = edge_slopes(signal, s.start, s.stop, top)
     return edges is not None and bool(np.all(edges[:, 0] <= 2.0 * edges[:, 1].clip(0) + 6.0 * noise + 4.0 * width))
+
+
+EASED = 1.5
+"""How much longer than at its own slope the signal must take to the level to count as coming to rest there."""
+
+
+def _eases(signal: FloatArray, s: Stretch, top: float, width: float) -> bool:
+    """Whether the signal slows down towards the level, at either end: a body that coasts, not an overload.
+
+    A signal cut off at a level goes on at its slope up to it; one that settles there, as an angular rate after a
+    blow, eases in.
+    """
+    return any(_slows(top - side, width) for side in (signal[: s.start + 1][::-1], signal[s.stop - 1 :]))
+
+
+def _slows(depth: FloatArray, width: float) -> bool:
+    """Whether a signal left its level slowly; `depth` (m,) below it, from the last flat sample outwards.
+
+    From 24 widths below the level, at the slope between 24 and 48, the level is τ sample intervals away. It took
+    more than EASED τ, and one for the sampling. (A sixth-order approach takes 2.4 τ, a parabola 1.6 τ.)
+    """
+    beyond = int(np.argmax(depth > 3.0 * WIDER * width))
+    if depth[beyond] <= 3.0 * WIDER * width:
+        return False
+    farther = beyond + max(int(np.argmax(depth[beyond:] > 6.0 * WIDER * width)), 1)
+    if farther >= depth.size or depth[farther] <= depth[beyond]:
+        return False
+    slope = (depth[farther] - depth[beyond]) / (farther - beyond)
+    return bool(beyond > EASED * depth[beyond] / slope + 1.0)
 
 
 def _all_at_level(near: BoolArray, flats: list[Stretch], top: float) -> tuple[Stretch, ...]:

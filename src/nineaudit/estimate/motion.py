@@ -89,7 +89,7 @@ def estimate_motion(
         valid = np.isfinite(readings[:, gyros])
         measured = rates_omega(array.axes[gyros], readings[:, gyros], sigma[gyros], valid)
         found = _with_accelerations(bridge(measured, time), positions, axes, readings[:, accelerometers], time)
-        return replace(found, known=np.isfinite(measured).all(axis=1))
+        return replace(found, known=np.asarray(np.isfinite(measured).all(axis=1)))
     combination = rigid_body.product_free_alpha(positions, axes, leak=OFF_IDEAL)
     if rest_index is None:
         raise EstimationError(
@@ -111,14 +111,12 @@ def _with_accelerations(
     if rank == 6:
         y = bridge(readings, time) - rigid_body.centripetal(positions, axes, omega)
         solved = y @ np.linalg.pinv(design).T
-        return Motion(
-            omega, solved[:, 3:], solved[:, :3], "rate sensors; α by least squares of the accelerometers"
-        )
+        return Motion(omega, solved[:, 3:], solved[:, :3], "rate sensors; α by least squares of the accelerometers")
     alpha = kinematics.differentiate(omega, time)
     a0 = np.full_like(omega, np.nan)
     if len(axes) and np.linalg.matrix_rank(axes, tol=1e-3) == 3:
-        moved = np.einsum(
-            "ki,nki->nk", axes, np.cross(alpha[:, None, :], positions)
-        ) + rigid_body.centripetal(positions, axes, omega)
+        moved = np.einsum("ki,nki->nk", axes, np.cross(alpha[:, None, :], positions)) + rigid_body.centripetal(
+            positions, axes, omega
+        )
         a0 = (bridge(readings, time) - moved) @ np.linalg.pinv(axes).T
     return Motion(omega, alpha, a0, "rate sensors; α by differentiation")

@@ -42,7 +42,8 @@ def channel_residuals(
     """Residual of every channel against the whole array, with its error budget.
 
     `readings` (n,k) SI zeroed (NaN invalid), `sigma` (k,) noise, `motion` from the same readings. A sample with
-    an invalid channel is NaN in every channel it takes part with, and so is one at which ω is not known. Channels without redundancy are NaN.
+    an invalid channel is NaN in every channel it takes part with, and so is one at which ω is
+    not known. Channels without redundancy are NaN.
     """
     accelerometers = np.flatnonzero(array.is_accelerometer)
     gyros = np.flatnonzero(~array.is_accelerometer)

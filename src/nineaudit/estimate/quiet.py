@@ -64,9 +64,7 @@ def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray) -> Quie
     allowed = np.where(np.isfinite(noise[alive]), 3.0 * noise[alive], 0.02 * overall)
     allowed = np.where(allowed > 0, allowed, np.inf)
     starts = np.arange(0, readings.shape[0] - length + 1, max(1, length // 4))
-    scatter = _windowed_sd(
-        np.nan_to_num(readings[:, alive] - np.nanmean(readings[:, alive], axis=0)), starts, length
-    )
+    scatter = _windowed_sd(np.nan_to_num(readings[:, alive] - np.nanmean(readings[:, alive], axis=0)), starts, length)
     # the median channel chooses, so that one noisy channel cannot hide the rest of the array's rest
     badness = np.median(scatter / allowed, axis=1)
     best = int(np.argmin(badness))
@@ -94,7 +92,7 @@ def _windowed_sd(values: FloatArray, starts: np.ndarray, length: int) -> FloatAr
     first = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
     second = np.vstack([np.zeros(values.shape[1]), np.cumsum(values**2, axis=0)])
     mean = (first[starts + length] - first[starts]) / length
-    return np.sqrt(np.maximum((second[starts + length] - second[starts]) / length - mean**2, 0.0))
+    return np.asarray(np.sqrt(np.maximum((second[starts + length] - second[starts]) / length - mean**2, 0.0)))
 
 
 def noise_level(readings: FloatArray, samples: slice | None) -> FloatArray:
@@ -107,7 +105,7 @@ def noise_level(readings: FloatArray, samples: slice | None) -> FloatArray:
         window = readings[samples]
         count = np.isfinite(window).sum(axis=0)
         centred = window - np.nansum(window, axis=0) / np.maximum(count, 1)
-        return np.sqrt(np.nansum(centred**2, axis=0) / np.maximum(count - 1, 1))
+        return np.asarray(np.sqrt(np.nansum(centred**2, axis=0) / np.maximum(count - 1, 1)))
     second = np.abs(np.diff(readings, n=2, axis=0))
     out = np.zeros(readings.shape[1])
     for k in range(readings.shape[1]):

@@ -100,10 +100,10 @@ def _of_channel(
     tops = flat_tops(values, noise, full_scale=recording.rig.array.sensors[column].full_scale, moving=moving)
     lost = dropouts(values, noise)
     explained = (*(s for top in tops for s in top.stretches), *lost)
-    dead = np.isfinite(values).any() and np.nanmin(values) == np.nanmax(values)
     frozen, limit = stuck(
         values,
-        moving=_witness(recording, trace, column, DEAD_FACTOR * floors) if dead else moving,
+        moving=moving,
+        hurrying=_witness(recording, trace, column, DEAD_FACTOR * floors),
         excluded=mask(explained, values.size),
     )
     cut_off = tuple(s for s in frozen if s.level == 0.0 and s.start > 0 and s.stop < values.size)
