@@ -110,6 +110,7 @@ def clipping(scene: Scene, value: float) -> FloatArray:
 
 
 def dropout(scene: Scene, value: float) -> FloatArray:
+    """Nothing arrives for `value` s: the channel reads zero, its last value, or nothing that is valid."""
     start = scene.time_of_peak - value / 2 if scene.at is None else scene.at
     lost = (scene.time >= start) & (scene.time < start + value)
     if not lost.any():
