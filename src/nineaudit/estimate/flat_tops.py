@@ -9,6 +9,10 @@ quantisation steps (a limit that wriggles), five noise deviations (a limit befor
 The evidence of a flat stretch of n samples within w, m within 8 w, whose neighbours lie at least D lower, is
 (n − 1 − (m − n)) ln(D/w): the chance that so many samples of a signal that changes by D from sample to sample
 fall within w of its extreme. It adds over the stretches at one level.
+
+Three things are flat and healthy: rest (the record begins or ends there, or nothing else moves), coasting (an
+angular rate after a blow eases into its level) and a dropout (jumped to out of nowhere). They are told apart below;
+a level at the stated full scale needs no such excuse.
 """
 
 from __future__ import annotations
@@ -95,7 +99,8 @@ def _best_width(
         (4 * step, 4 * step, False),
         (5 * noise, 5 * max(noise, step), True),
     ):
-        if width <= 0.0 or top - signal.min() < 3.0 * WIDER * width:
+        needed = (4.5 if noisy else 3.0) * WIDER * width  # so that the way to the level is seen well
+        if width <= 0.0 or top - signal.min() < needed:
             continue
         near = signal >= top - near_width - 1e-12 * abs(top)
         if not at_rail and _rests_there(signal >= top - WIDER * width, shortest):
@@ -159,6 +164,8 @@ def _arrives(signal: FloatArray, s: Stretch, top: float, noise: float, width: fl
     return edges is not None and bool(np.all(edges[:, 0] <= 2.0 * edges[:, 1].clip(0) + 6.0 * noise + 4.0 * width))
 
 
+COARSE = 240.0
+"""Part of the range at which easing is looked for besides the width itself: from a tenth of the range away."""
 EASED = 1.5
 """How much longer than at its own slope the signal must take to the level to count as coming to rest there."""
 
@@ -169,19 +176,23 @@ def _eases(signal: FloatArray, s: Stretch, top: float, width: float) -> bool:
     A signal cut off at a level goes on at its slope up to it; one that settles there, as an angular rate after a
     blow, eases in.
     """
-    return any(_slows(top - side, width) for side in (signal[: s.start + 1][::-1], signal[s.stop - 1 :]))
+    sides = signal[: s.start + 1][::-1], signal[s.stop - 1 :]
+    scales = {width, max(width, float(np.ptp(signal)) / COARSE)}
+    return any(_slows(top - side, scale) for side in sides for scale in scales)
 
 
 def _slows(depth: FloatArray, width: float) -> bool:
     """Whether a signal left its level slowly; `depth` (m,) below it, from the last flat sample outwards.
 
-    From 24 widths below the level, at the slope between 24 and 48, the level is τ sample intervals away. It took
+    From 24 widths below the level, at the slope between 24 and 48 (or half the way to the bottom), the level is τ sample intervals away. It took
     more than EASED τ, and one for the sampling. (A sixth-order approach takes 2.4 τ, a parabola 1.6 τ.)
     """
-    beyond = int(np.argmax(depth > 3.0 * WIDER * width))
-    if depth[beyond] <= 3.0 * WIDER * width:
+    far = 3.0 * WIDER * width
+    beyond = int(np.argmax(depth > far))
+    if depth[beyond] <= far:
         return False
-    farther = beyond + max(int(np.argmax(depth[beyond:] > 6.0 * WIDER * width)), 1)
+    deeper = min(2.0 * far, 0.5 * (far + float(depth.max())))
+    farther = max(int(np.argmax(depth > deeper)), beyond + 1)
     if farther >= depth.size or depth[farther] <= depth[beyond]:
         return False
     slope = (depth[farther] - depth[beyond]) / (farther - beyond)
