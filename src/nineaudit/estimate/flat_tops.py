@@ -184,8 +184,9 @@ def _eases(signal: FloatArray, s: Stretch, top: float, width: float) -> bool:
 def _slows(depth: FloatArray, width: float) -> bool:
     """Whether a signal left its level slowly; `depth` (m,) below it, from the last flat sample outwards.
 
-    From 24 widths below the level, at the slope between 24 and 48 (or half the way to the bottom), the level is τ sample intervals away. It took
-    more than EASED τ, and one for the sampling. (A sixth-order approach takes 2.4 τ, a parabola 1.6 τ.)
+    From 24 widths below the level, at the slope between 24 and 48 (or half the way to the bottom), the level is τ
+    sample intervals away. It took more than EASED τ, and one for the sampling. (A fifth-order approach takes 2.4 τ,
+    a parabola 1.6 τ.)
     """
     far = 3.0 * WIDER * width
     beyond = int(np.argmax(depth > far))
