@@ -183,6 +183,14 @@ def test_a_stuck_channel_is_found_from_where_it_stops() -> None:
     assert limit == 10
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_smooth_pulse_cut_off_close_to_its_peak_is_clipped_not_stuck(seed: int) -> None:
+    """The signal eases in there, as if it coasted; but a channel with noise never repeats itself by chance."""
+    clipped = simulate(parse_rig(preset_text("naap-3222")), "drop", seed=seed, faults=["a0z:clipping=0.9"])
+    found = {f.channel: f.fault for f in Case(clipped.recording).evidence if f.fault}
+    assert found == {"a0z": "clipping"}
+
+
 def test_rest_at_coarse_resolution_is_not_stuck() -> None:
     """A slow signal of one step's size makes runs of hundreds of samples, over and over."""
     x = np.round(1.2 * np.sin(np.arange(20_000) / 300))

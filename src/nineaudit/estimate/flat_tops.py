@@ -51,6 +51,15 @@ class FlatTop:
         return sum(len(s) for s in self.stretches)
 
 
+RAIL_TOLERANCE = 0.02
+"""How far below the stated full scale, as a part of it, a level is still the rail."""
+
+
+def is_rail(level: float, full_scale: float | None) -> bool:
+    """Whether a level is at the stated full scale, or beyond it."""
+    return full_scale is not None and abs(level) >= (1.0 - RAIL_TOLERANCE) * full_scale
+
+
 def flat_tops(
     values: FloatArray,
     noise: float,
@@ -59,13 +68,11 @@ def flat_tops(
     moving: Moving = always,
     shortest: int = 3,
     false_alarm: float = 1e-6,
-    rail_tolerance: float = 0.02,
 ) -> tuple[FlatTop, ...]:
     """Flat tops at the maximum and at the minimum of `values` (n,); at most one of each.
 
     `noise` and `full_scale` in the unit of the values. A level counts when one stretch holds `shortest` samples
-    or more and the evidence reaches ln(1/false_alarm); a level within `rail_tolerance` (relative) of the full
-    scale, or beyond it, needs less.
+    or more and the evidence reaches ln(1/false_alarm); a level at the rail needs less.
     """
     at = np.flatnonzero(np.isfinite(values))  # invalid samples neither end a stretch nor belong to one
     if at.size < 8 * shortest:
@@ -78,7 +85,7 @@ def flat_tops(
     for sign in (1.0, -1.0):
         signal = sign * values[at]
         top = float(signal.max())
-        at_rail = full_scale is not None and abs(top) >= (1.0 - rail_tolerance) * full_scale
+        at_rail = is_rail(top, full_scale)
         needed = np.log(1.0 / false_alarm) - (RAIL_NATS if at_rail else 0.0)
         best = _best_width(signal, top, noise, moving_at, shortest, at_rail)
         if best is not None and best[1] >= needed:

@@ -22,8 +22,9 @@ from nineaudit.estimate.evidence import (
     resolution,
     spikes,
     stuck,
+    true_runs,
 )
-from nineaudit.estimate.flat_tops import FlatTop, flat_tops
+from nineaudit.estimate.flat_tops import FlatTop, flat_tops, is_rail
 from nineaudit.recording import Recording, Trace
 
 DEAD_FACTOR = 16.0
@@ -106,10 +107,21 @@ def _of_channel(
         hurrying=_witness(recording, trace, column, DEAD_FACTOR * floors),
         excluded=mask(explained, values.size),
     )
-    cut_off = tuple(s for s in frozen if s.level == 0.0 and s.start > 0 and s.stop < values.size)
-    frozen = tuple(s for s in frozen if s not in cut_off)
+    inner = tuple(s for s in frozen if s.start > 0 and s.stop < values.size)
+    cut_off = tuple(s for s in inner if s.level == 0.0)
+    cut_flat = tuple(s for s in inner if s not in cut_off and s.level in (np.nanmin(values), np.nanmax(values)))
+    tops = (*tops, *_at_extremes(values, cut_flat, recording.rig.array.sensors[column].full_scale))
+    frozen = tuple(s for s in frozen if s not in cut_off and s not in cut_flat)
     alone = _unwitnessed(recording, trace, column, jolted, spikes(values, noise))
     return ChannelEvidence(trace.channel, tops, (*lost, *cut_off), frozen, limit, tuple(alone))
+
+
+def _at_extremes(values: FloatArray, runs: Sequence[Stretch], full_scale: float | None) -> Iterator[FlatTop]:
+    """Runs that noise does not explain, at the highest or lowest value of the trace, as flat tops: the signal eases
+    in there, but a channel whose noise vanishes at its extreme is cut off, not at rest."""
+    for level in sorted({s.level for s in runs}):
+        stretches = tuple(Stretch(int(a), int(b), level) for a, b in zip(*true_runs(values == level), strict=True))
+        yield FlatTop(level, stretches, 0.0, is_rail(level, full_scale))
 
 
 def _witness(recording: Recording, trace: Trace, column: int, floors: FloatArray) -> Moving:
