@@ -39,11 +39,23 @@ def integrate(values: FloatArray, time: FloatArray, initial: FloatArray | float 
     result = np.empty(values.shape)
     result[0] = initial
     if steps.size:
-        first, weights = _quadrature(time, steps)
-        samples = values[first[:, None] + np.arange(weights.shape[1])]
-        increments = np.einsum("ip,ip...->i...", steps[:, None] * weights, samples)
-        result[1:] = result[0] + np.cumsum(increments, axis=0)
+        increments = _increments(steps[:, None] * _quadrature(time, steps), values.reshape(time.size, -1))
+        result[1:] = result[0] + np.cumsum(increments, axis=0).reshape(values[1:].shape)
     return result
+
+
+def _increments(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """(n-1,m) weighted sums of `values` (n,m) over the stencil of every interval, `weights` (n-1,p)."""
+    size = weights.shape[1]
+    before, centred = size // 2 - 1, len(values) - size + 1
+    out = np.empty((len(weights), values.shape[1]))
+    out[:before] = weights[:before] @ values[:size]
+    out[before + centred :] = weights[before + centred :] @ values[-size:]
+    inner, own = out[before : before + centred], weights[before : before + centred]
+    np.multiply(own[:, :1], values[:centred], out=inner)
+    for j in range(1, size):
+        inner += own[:, j : j + 1] * values[j : j + centred]
+    return out
 
 
 def _steps(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -60,16 +72,16 @@ def _steps(time: FloatArray, values: FloatArray) -> FloatArray:
     return steps
 
 
-def _quadrature(time: FloatArray, steps: FloatArray) -> tuple[np.ndarray, FloatArray]:
-    """First sample (n-1,) and weights (n-1,p) of the stencil of every interval."""
+def _quadrature(time: FloatArray, steps: FloatArray) -> FloatArray:
+    """(n-1,p) weights of every interval's stencil: the p samples about it, at the ends the first and last p."""
     size = min(STENCIL, time.size)
     interval = np.arange(steps.size)
     first = np.clip(interval - (size // 2 - 1), 0, time.size - size)
     nodes = time[first[:, None] + np.arange(size)]
     x = (nodes - time[:-1, None]) / steps[:, None]
 
-    offsets, which = np.unique(first - interval, return_inverse=True)
-    uniform = offsets[:, None] + np.arange(float(size))
+    which = first - interval + size - 2
+    uniform = np.arange(2.0 - size, 1.0)[:, None] + np.arange(float(size))
     weights = _moment_weights(uniform)[which]
     uneven = np.abs(x - uniform[which]).max(axis=1) > 1e-9
     weights[uneven] = _moment_weights(x[uneven])
@@ -78,7 +90,7 @@ def _quadrature(time: FloatArray, steps: FloatArray) -> tuple[np.ndarray, FloatA
     rough = np.flatnonzero(spacing.max(axis=1) > MAX_STEP_RATIO * spacing.min(axis=1))
     weights[rough] = 0.0
     weights[rough, rough - first[rough]] = weights[rough, rough - first[rough] + 1] = 0.5
-    return first, weights
+    return np.asarray(weights)
 
 
 def _moment_weights(x: FloatArray) -> FloatArray:
