@@ -127,19 +127,22 @@ def response(problem: Problem, channel: int | None, patterns: FloatArray, turned
     """
     products, alphas = nap.product_rows(problem.arms), nap.alpha_rows(problem.arms)
     omega = nap.omega(replaced(problem, channel, problem.readings), problem.arms, problem.time)
-    direct = np.einsum("ic,cnp->cnip", products, patterns)
-    spin = np.einsum("ic,cnp->cnip", alphas, turned)
+    direct = products[:, :, None, None] * patterns
+    spin = alphas[:, :, None, None] * turned
     if channel is not None:
         moved = rebuilt_response(problem, channel, omega, patterns, turned)
         flat = np.moveaxis(moved, 0, 1).reshape(len(problem.time), -1)
         swept = np.moveaxis(kinematics.integrate(flat, problem.time).reshape(-1, 9, moved.shape[2]), 1, 0)
-        direct += products[:, channel, None] * moved[:, :, None, :]
-        spin += alphas[:, channel, None] * swept[:, :, None, :]
-        direct[channel], spin[channel] = 0.0, 0.0
-    left, right = [1, 2, 0], [2, 0, 1]
-    direct -= omega[:, left, None] * spin[:, :, right]
-    direct -= omega[:, right, None] * spin[:, :, left]
-    return np.asarray(direct)
+        for i in range(3):
+            if products[i, channel]:
+                direct[i] += products[i, channel] * moved
+            if alphas[i, channel]:
+                spin[i] += alphas[i, channel] * swept
+        direct[:, channel], spin[:, channel] = 0.0, 0.0
+    for i, left, right in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        direct[i] -= omega[:, left, None] * spin[right]
+        direct[i] -= omega[:, right, None] * spin[left]
+    return np.moveaxis(direct, 0, 2)
 
 
 def rebuilt_response(
