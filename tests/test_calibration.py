@@ -37,7 +37,7 @@ def test_columns_are_the_derivatives_of_the_reading(channel, moving):
     time, readings, motion = moving
     sensor = RIG.array[channel]
     y = readings[:, RIG.array.index(channel)]
-    columns = calibration.columns(sensor, y, time, motion)
+    columns = calibration.columns(SensorArray((sensor,)), y[:, None], time, motion)[:, 0]
     step = 1e-6
     across = calibration.perpendicular(sensor.axis)
     changed = {
@@ -57,7 +57,7 @@ def test_time_skew_is_a_shift_of_the_curve(moving):
     time, readings, motion = moving
     sensor, y = RIG.array["a1z"], readings[:, RIG.array.index("a1z")]
     late = np.interp(time - 1e-5, time, y)
-    columns = calibration.columns(sensor, y, time, motion)
+    columns = calibration.columns(SensorArray((sensor,)), y[:, None], time, motion)[:, 0]
     # linear interpolation and the central difference agree to the second order of the sampling interval
     assert np.abs(late - y - 1e-5 * columns[:, 7]).max() < 0.05 * np.abs(late - y).max()
 
@@ -96,7 +96,7 @@ def test_first_order_change_matches_the_simulated_instrument():
     drawn = simulate(rig, "general", seed=5, noise=False)
     motion = Motion(drawn.truth.omega, drawn.truth.alpha, drawn.truth.a0, "truth")
     for i, sensor in enumerate(rig.array.sensors):
-        columns = calibration.columns(sensor, drawn.ideal[:, i], drawn.truth.time, motion)
+        columns = calibration.columns(rig.array, drawn.ideal, drawn.truth.time, motion)[:, i]
         theta = np.concatenate(
             [[drawn.drawn["gain"][i], drawn.drawn["zero"][i]], [0.0, 0.0], drawn.drawn["position"][i], [0.0]]
         )

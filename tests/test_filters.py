@@ -69,9 +69,7 @@ def test_is_the_forward_and_backward_filter_of_scipy(
 ) -> None:
     """Odd reflection over 10 ms or 100 samples, whichever is more (ISO 6487 Annex A)."""
     values = np.random.default_rng(1).normal(5.0, 100.0, shape)
-    b, a = filters.coefficients(
-        60, rate, standard
-    )  # a low class: the length of the padding shows at the ends
+    b, a = filters.coefficients(60, rate, standard)  # a low class: the length of the padding shows at the ends
     expected = filtfilt(b, [1.0, -a[0], -a[1]], values, axis=0, padlen=padded)
     np.testing.assert_allclose(filters.cfc(values, rate, 60, standard), expected, atol=1e-9)
 
@@ -86,9 +84,7 @@ def test_filter_is_linear_and_leaves_its_input() -> None:
     f, g = np.random.default_rng(2).normal(size=(2, 400))
     before = f.copy()
     both = filters.cfc(2.0 * f - 3.0 * g, 10_000, 600)
-    np.testing.assert_allclose(
-        both, 2.0 * filters.cfc(f, 10_000, 600) - 3.0 * filters.cfc(g, 10_000, 600), atol=1e-12
-    )
+    np.testing.assert_allclose(both, 2.0 * filters.cfc(f, 10_000, 600) - 3.0 * filters.cfc(g, 10_000, 600), atol=1e-12)
     np.testing.assert_array_equal(f, before)
 
 

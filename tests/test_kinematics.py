@@ -72,9 +72,7 @@ def test_a_gap_is_crossed_by_the_trapezoid() -> None:
     assert increment == pytest.approx((time[50] - time[49]) * (noise[49] + noise[50]) / 2.0)
 
 
-@pytest.mark.parametrize(
-    "time", [np.array([0.0, 1.0, 1.0]), np.array([0.0, 2.0, 1.0]), np.array([0.0, np.nan, 1.0])]
-)
+@pytest.mark.parametrize("time", [np.array([0.0, 1.0, 1.0]), np.array([0.0, 2.0, 1.0]), np.array([0.0, np.nan, 1.0])])
 def test_time_that_does_not_increase_is_refused(time: FloatArray) -> None:
     for function in (kinematics.integrate, kinematics.differentiate):
         with pytest.raises(EstimationError, match="not increasing"):

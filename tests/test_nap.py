@@ -74,9 +74,7 @@ def test_alpha_and_products_are_those_of_the_motion(arms: FloatArray) -> None:
     readings = ideal(arms, motion)
     np.testing.assert_allclose(nap.alpha(readings, arms), alpha, atol=1e-10 * np.abs(alpha).max())
     x, y, z = omega.T
-    np.testing.assert_allclose(
-        nap.products(readings, arms), np.stack([y * z, z * x, x * y], axis=1), atol=1e-8
-    )
+    np.testing.assert_allclose(nap.products(readings, arms), np.stack([y * z, z * x, x * y], axis=1), atol=1e-8)
 
 
 @pytest.mark.parametrize("arms", [ARMS, SIGNED])
@@ -167,9 +165,7 @@ def test_misprints_of_equations_25_and_28b() -> None:
     wx, wy, _ = omega.T
     readings = ideal(ARMS, motion)
     a0x, a0y, _, a1y, _, a2x, _, a3x, _ = readings.T
-    a1x = acceleration_at(np.array([rx, 0, 0]), a0, alpha, omega)[
-        :, 0
-    ]  # printed, though no channel of the array
+    a1x = acceleration_at(np.array([rx, 0, 0]), a0, alpha, omega)[:, 0]  # printed, though no channel of the array
     wy_printed = integrate((a3x - a0x) / (2 * rz) - (a1x - a0x) / (2 * rx), time, omega[0, 1])
     for printed, corrected, truth in (
         (

@@ -238,9 +238,7 @@ def test_units_do_not_change_the_array(
     si, other = _in_units("m", "m/s^2", "rad/s", arms), _in_units(length, acceleration, rate, arms)
     assert_same_array(si.array, other.array)
     np.testing.assert_allclose(si.points[0].position, other.points[0].position, rtol=1e-14)
-    np.testing.assert_allclose(
-        other.array.values("to_si")[[0, -1]], [ACCELERATIONS[acceleration], RATES[rate]]
-    )
+    np.testing.assert_allclose(other.array.values("to_si")[[0, -1]], [ACCELERATIONS[acceleration], RATES[rate]])
 
 
 @given(st.permutations(range(9)))
@@ -288,9 +286,7 @@ def parity_rows(array: SensorArray) -> int:
     is_a = array.is_accelerometer
     h = np.hstack([n, np.cross(r, n)])[is_a]
     rates = n[~is_a]
-    return (
-        len(array) - int(np.linalg.matrix_rank(h)) - (int(np.linalg.matrix_rank(rates)) if len(rates) else 0)
-    )
+    return len(array) - int(np.linalg.matrix_rank(h)) - (int(np.linalg.matrix_rank(rates)) if len(rates) else 0)
 
 
 @pytest.mark.parametrize(
@@ -308,9 +304,7 @@ def parity_rows(array: SensorArray) -> int:
         ("compact-cube", 3, 3, 0),
     ],
 )
-def test_every_layout_has_the_channels_of_its_name(
-    name: str, accelerometers: int, gyros: int, redundancy: int
-) -> None:
+def test_every_layout_has_the_channels_of_its_name(name: str, accelerometers: int, gyros: int, redundancy: int) -> None:
     """Instantaneous redundancy, METHODS.md 3; the derivative of omega adds to it where alpha is measured."""
     array = parse_rig(preset_text(name)).array
     assert array.is_accelerometer.sum() == accelerometers
@@ -373,9 +367,7 @@ def test_rig_files_follow_the_schema(validator: jsonschema.Draft202012Validator,
     assert list(validator.iter_errors(tomllib.loads(text))) == []
 
 
-def test_real_rig_file_follows_the_schema(
-    validator: jsonschema.Draft202012Validator, shared_data: Path
-) -> None:
+def test_real_rig_file_follows_the_schema(validator: jsonschema.Draft202012Validator, shared_data: Path) -> None:
     text = (shared_data / "mimu-array" / "rig.toml").read_text(encoding="utf-8")
     assert list(validator.iter_errors(tomllib.loads(text))) == []
 

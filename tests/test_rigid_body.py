@@ -103,9 +103,7 @@ def test_product_matrix_gives_the_centripetal_term() -> None:
     omega = states()[2]
     x, y, z = omega.T
     products = np.stack([x * x, y * y, z * z, y * z, z * x, x * y], axis=1)
-    np.testing.assert_allclose(
-        products @ rb.product_matrix(*where).T, rb.centripetal(*where, omega), atol=1e-10
-    )
+    np.testing.assert_allclose(products @ rb.product_matrix(*where).T, rb.centripetal(*where, omega), atol=1e-10)
 
 
 @pytest.mark.parametrize("arms", [(R, R, R), (0.05, 0.06, 0.07), (-0.03, 0.08, 0.05)])
@@ -153,9 +151,7 @@ def test_leak_lets_seismic_masses_sit_off_the_ideal_points() -> None:
     with pytest.raises(EstimationError, match="leak"):
         rb.product_free_alpha(positions, axes)
     rows = rb.product_free_alpha(positions, axes, leak=0.05)
-    np.testing.assert_allclose(
-        rows @ rb.design(positions, axes), np.hstack([np.zeros((3, 3)), np.eye(3)]), atol=1e-9
-    )
+    np.testing.assert_allclose(rows @ rb.design(positions, axes), np.hstack([np.zeros((3, 3)), np.eye(3)]), atol=1e-9)
     assert np.abs(rows @ rb.product_matrix(positions, axes)).max() < 0.05
 
 

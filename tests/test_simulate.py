@@ -296,9 +296,7 @@ def test_the_signal_too_goes_through_the_class_on_request() -> None:
     )  # fmt: skip
     peak = {f: np.abs(made.recording.readings).max() for f, made in sharp.items()}
     assert peak[True] < 0.97 * peak[False]
-    assert slow[True].recording.column("a0x") == pytest.approx(
-        slow[False].recording.column("a0x"), abs=0.02 * 40 * G0
-    )
+    assert slow[True].recording.column("a0x") == pytest.approx(slow[False].recording.column("a0x"), abs=0.02 * 40 * G0)
 
 
 # --- recording --------------------------------------------------------------------------------------------

@@ -86,9 +86,7 @@ def test_scale_faults(text: str, ratio: float) -> None:
     assert column == pytest.approx(ratio * healthy, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("amount", "part"), [("5%", None), ("2", 2 * G0), ("3 m/s^2", 3.0), ("0.5g_0", 0.5 * G0)]
-)
+@pytest.mark.parametrize(("amount", "part"), [("5%", None), ("2", 2 * G0), ("3 m/s^2", 3.0), ("0.5g_0", 0.5 * G0)])
 def test_zero_shift_is_a_step_at_the_event(amount: str, part: float | None) -> None:
     time, healthy, column = before_after(f"a1y:zero_shift={amount}")
     size = 0.05 * np.abs(healthy).max() if part is None else part
@@ -144,9 +142,7 @@ def test_dropout_lasts_as_long_as_asked(mode: str) -> None:
     assert np.array_equal(column[~lost], healthy[~lost])
     reads = {"zero": 0.0, "hold": healthy[np.argmax(lost) - 1], "invalid": np.nan}[mode]
     assert np.array_equal(column[lost], np.full(50, reads), equal_nan=True)
-    assert np.array_equal(
-        made.recording.valid[:, K], ~lost if mode == "invalid" else np.ones(len(time), bool)
-    )
+    assert np.array_equal(made.recording.valid[:, K], ~lost if mode == "invalid" else np.ones(len(time), bool))
 
 
 def test_dropout_takes_the_peak_unless_told_otherwise() -> None:

@@ -156,8 +156,8 @@ def mend(case: Case, channel: str) -> Reconstruction:
     seen = case.flagged[:, case.array.index(channel)]
     if seen.any():
         partly = rebuild_channel(case, channel, seen)
-        healthy = case.with_readings([channel], partly.repaired).nap_healthy
-        if healthy.statistic <= closed_form.limit_per_dof(healthy.dof):
+        mended = case.with_readings([channel], partly.repaired)
+        if mended.statistic <= mended.statistic_limit:
             return partly
     return rebuild_channel(case, channel)
 

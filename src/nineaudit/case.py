@@ -16,9 +16,14 @@ from nineaudit.array import BoolArray, FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import budget, closed_form, condense
 from nineaudit.estimate import parity as parity_of
-from nineaudit.estimate.motion import Motion, bridge, estimate_motion
+from nineaudit.estimate.hypotheses import healthy_fit
+from nineaudit.estimate.model import Data
+from nineaudit.estimate.motion import Motion, bridge, estimate_motion, has_rates, product_free, resampled
 from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
+from nineaudit.estimate.search import Search, search
 from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
+from nineaudit.estimate.start import make_data
+from nineaudit.estimate.trajectory import Fit
 from nineaudit.physics import nap
 from nineaudit.recording import Recording
 
@@ -99,7 +104,11 @@ class Case:
         EstimationError where the array cannot tell them.
         """
         start = None if self.rest is None else self.rest.start
-        return estimate_motion(self.array, self.time, self.readings, self.sigma, start)
+        if has_rates(self.array) or product_free(self.array):
+            return estimate_motion(self.array, self.time, self.readings, self.sigma, start)
+        found, blocks = self.healthy.motion, self.condensed.time
+        omega, alpha, a0 = (resampled(v, blocks, self.time) for v in (found.omega, found.alpha, found.a0))
+        return Motion(omega, alpha, a0, found.method)
 
     @cached_property
     def evidence(self) -> tuple[ChannelEvidence, ...]:
@@ -161,6 +170,59 @@ class Case:
         )
 
     @cached_property
+    def fit_data(self) -> Data:
+        """What the whole-record fit sees: the blocks of `condensed`, ω = 0 known over the quiet interval."""
+        rest = None
+        if self.rest is not None:
+            rest = (self.rest.start // self.condensed.length, self.rest.stop // self.condensed.length)
+        return make_data(self.array, self.condensed, rest)
+
+    @property
+    def onset(self) -> int:
+        """Block at which the event may begin: the end of the quiet interval, or the first."""
+        return (
+            0
+            if self.rest is None or self.rest.start > 0.5 * len(self.time)
+            else self.rest.stop // self.condensed.length
+        )
+
+    @property
+    def statistic_limit(self) -> float:
+        """Largest cost per degree of freedom of the whole-record fit of a healthy recording."""
+        dof = self.nap_healthy.dof if self.closed_forms_apply else self.fit_data.dof
+        return closed_form.limit_per_dof(max(dof, 1))
+
+    @cached_property
+    def search(self) -> Search:
+        """The whole-record fit and its hypotheses. EstimationError where the motion cannot be fitted."""
+        return search(self.healthy, self.onset, self.flagged_blocks, self.statistic_limit)
+
+    @cached_property
+    def healthy(self) -> Fit:
+        """The whole-record fit with every channel at its word. EstimationError where the motion cannot be told."""
+        return healthy_fit(self.fit_data)
+
+    @property
+    def statistic(self) -> float:
+        """Cost per degree of freedom of the record with every channel at its word: by the closed forms for nine
+        accelerometers in the 3-2-2-2 layout, else of the whole-record fit. EstimationError where neither can tell."""
+        if self.closed_forms_apply:
+            return self.nap_healthy.statistic
+        return self.healthy.statistic
+
+    @property
+    def closed_forms_apply(self) -> bool:
+        """Whether the array is an ideal 3-2-2-2 and nothing else."""
+        return self.nap_layout is not None and bool(self.array.is_accelerometer.all())
+
+    @property
+    def flagged_blocks(self) -> BoolArray:
+        """(m,k) blocks of `condensed` that hold a flagged sample."""
+        length = self.condensed.length
+        whole = len(self.condensed.time) * length
+        return np.asarray(self.flagged[:whole].reshape(-1, length, len(self.array)).any(axis=1))
+
+    @cached_property
     def nap_problem(self) -> closed_form.Problem | None:
         """The nine channels of an ideal 3-2-2-2, condensed, for the closed forms; None where the array has none."""
         if self.nap_layout is None:
@@ -176,9 +238,14 @@ class Case:
     @cached_property
     def nap_healthy(self) -> closed_form.Hypothesis:
         """Fit of the healthy hypothesis to nap_problem; EstimationError where there is none."""
+        return closed_form.fit_hypothesis(self.required_nap_problem, None)
+
+    @property
+    def required_nap_problem(self) -> closed_form.Problem:
+        """nap_problem; EstimationError where there is none."""
         if self.nap_problem is None:
-            raise EstimationError("the array holds no ideal 3-2-2-2 layout")
-        return closed_form.fit_hypothesis(self.nap_problem, None)
+            raise EstimationError("the accelerometers are no ideal 3-2-2-2 layout")
+        return self.nap_problem
 
     @cached_property
     def nap_layout(self) -> tuple[tuple[int, ...], FloatArray] | None:

@@ -92,14 +92,10 @@ def _toml(text: str, path: Path | None) -> dict[str, Any]:
             f"not valid TOML: {what[:1].lower()}{what[1:]}", file=path, place=where.rstrip(")") or None
         ) from error
     except (ValueError, RecursionError) as error:  # integers of thousands of digits, brackets thousands deep
-        raise ConfigurationError(
-            "not readable TOML: a number too long or nesting too deep", file=path
-        ) from error
+        raise ConfigurationError("not readable TOML: a number too long or nesting too deep", file=path) from error
 
 
-def _explain(
-    errors: list[ErrorDetails], document: Mapping[str, Any], path: Path | None
-) -> ConfigurationError:
+def _explain(errors: list[ErrorDetails], document: Mapping[str, Any], path: Path | None) -> ConfigurationError:
     """The first error as a sentence; unknown keys come first, since a misspelt key is also a missing one."""
     errors.sort(key=lambda e: e["type"] != "extra_forbidden")
     error = errors[0]

@@ -78,9 +78,7 @@ Text = Annotated[str, Field(min_length=1, pattern=r"^\S(.*\S)?$")]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Deviation = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
-LengthUnit = Annotated[
-    str, AfterValidator(_unit("length")), Field(json_schema_extra=_names(*UNIT_NAMES["length"]))
-]
+LengthUnit = Annotated[str, AfterValidator(_unit("length")), Field(json_schema_extra=_names(*UNIT_NAMES["length"]))]
 AccelerationUnit = Annotated[
     str, AfterValidator(_unit("acceleration")), Field(json_schema_extra=_names(*UNIT_NAMES["acceleration"]))
 ]
@@ -143,9 +141,7 @@ class RecordingTable(Table):
     """Unit of the time column. Default: from the suffix of its name (time_ms), else s."""
     dbc: list[Text] = []
     """CAN databases (.dbc, .arxml, .kcd), relative to this file."""
-    pre_trigger: (
-        Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)] | None
-    ) = None
+    pre_trigger: Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)] | None = None
     """Interval [start, end] in s, body at rest: zero offset, noise, omega(0) = 0. Default: looked for."""
     filter_class: FilterClass = "none"
     """Channel frequency class of the readings as recorded; none if unfiltered. Default: none."""

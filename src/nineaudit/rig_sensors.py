@@ -87,10 +87,7 @@ def check_unique(key: str, named: Iterable[tuple[str, str]], path: Path | None) 
 
 def _entries(tables: RigFile, path: Path | None) -> list[_Entry]:
     """Each channel once: the preset's with what its [[sensor]] table states, then the others."""
-    merged = {
-        s.channel: _Entry(_table(s), f"[rig] preset ({s.channel})", path)
-        for s in _preset_sensors(tables, path)
-    }
+    merged = {s.channel: _Entry(_table(s), f"[rig] preset ({s.channel})", path) for s in _preset_sensors(tables, path)}
     for index, table in enumerate(tables.sensor):
         place = table_place("sensor", index, table.channel)
         if table.channel in merged:
@@ -119,9 +116,7 @@ def _preset_sensors(tables: RigFile, path: Path | None) -> tuple[PresetSensor, .
 
 
 def _table(sensor: PresetSensor) -> SensorTable:
-    return SensorTable(
-        channel=sensor.channel, kind=sensor.kind, position=list(sensor.position), axis=list(sensor.axis)
-    )
+    return SensorTable(channel=sensor.channel, kind=sensor.kind, position=list(sensor.position), axis=list(sensor.axis))
 
 
 def _sensor(entry: _Entry, tables: RigFile) -> Sensor:

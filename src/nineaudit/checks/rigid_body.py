@@ -9,6 +9,8 @@ import numpy as np
 
 from nineaudit.case import Case
 from nineaudit.estimate import closed_form, parity
+from nineaudit.estimate.motion import has_rates, product_free
+from nineaudit.estimate.search import FEW_CHANNELS
 from nineaudit.finding import COVERAGE_FACTOR, Measure, NotApplicable
 
 AXES = ("ωyωz", "ωzωx", "ωxωy")
@@ -45,10 +47,9 @@ def constraint_equations(case: Case, *, false_alarm: float) -> tuple[Measure, ..
 def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
     """RB302: every channel against the least-squares fit of the whole array, (I − HH⁺)(y − q(ω)) [METHODS 2]."""
     if sum(parity.redundancy(case.array)) == 0:
-        return NotApplicable(
-            f"the {len(case.array)} channels have no redundancy: "
-            "rigid-body constraints cannot show a fault in any of them"
-        )
+        return NotApplicable(_nothing_to_spare(case))
+    if not (has_rates(case.array) or product_free(case.array)):
+        return NotApplicable("without rate sensors α of this layout is not free of ω; RB303 tests the whole record")
     worst = parity.worst(case.parity, false_alarm)
     sensor = case.array.sensors[worst.column]
     time = float(case.condensed.time[worst.row])
@@ -63,13 +64,23 @@ def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
 
 
 def whole_record(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
-    """RB303: cost per degree of freedom of the constraints over the whole record, calibration errors fitted within
-    their priors [METHODS 2]. Small faults that no single sample shows add up here."""
-    if case.nap_problem is None:
-        return NotApplicable("the array holds no ideal 3-2-2-2 layout; RB302 tests its general parity")
-    healthy = case.nap_healthy
-    return Measure(
-        healthy.statistic, closed_form.limit_per_dof(healthy.dof, false_alarm), "1", detail="cost per degree of freedom"
+    """RB303: cost per degree of freedom of the whole record, calibration errors fitted within their priors [METHODS 2].
+
+    Small faults that no single sample shows add up here. Of the constraints for nine accelerometers in the 3-2-2-2
+    layout, of the whole-record fit for any other array.
+    """
+    if sum(parity.redundancy(case.array)) == 0:
+        return NotApplicable(_nothing_to_spare(case))
+    if len(case.array) > FEW_CHANNELS:
+        return NotApplicable(f"more than {FEW_CHANNELS} channels; RB302 tests their parity")
+    dof = case.nap_healthy.dof if case.closed_forms_apply else case.fit_data.dof
+    limit = closed_form.limit_per_dof(dof, false_alarm)
+    return Measure(case.statistic, limit, "1", detail="cost per degree of freedom")
+
+
+def _nothing_to_spare(case: Case) -> str:
+    return (
+        f"the {len(case.array)} channels have no redundancy: rigid-body constraints cannot show a fault in any of them"
     )
 
 

@@ -55,6 +55,21 @@ def has_rates(array: SensorArray) -> bool:
     return bool(gyros.any()) and int(np.linalg.matrix_rank(array.axes[gyros], tol=1e-3)) == 3
 
 
+def product_free(array: SensorArray) -> bool:
+    """Whether the accelerometers give α without products of ω."""
+    held = array.is_accelerometer
+    try:
+        rigid_body.product_free_alpha(array.positions[held], array.axes[held], leak=OFF_IDEAL)
+    except EstimationError:
+        return False
+    return True
+
+
+def resampled(values: FloatArray, at: FloatArray, time: FloatArray) -> FloatArray:
+    """(n,3) `values` (m,3) at times `at`, carried to `time` (n,) by straight lines, ends held."""
+    return np.stack([np.interp(time, at, values[:, i]) for i in range(values.shape[1])], axis=1)
+
+
 def rates_omega(axes: FloatArray, readings: FloatArray, sigma: FloatArray, valid: BoolArray) -> FloatArray:
     """ω (n,3) by weighted least squares of rate sensors; samples with fewer than three axes are NaN.
 

@@ -39,9 +39,7 @@ def coefficients(
             "unknown filter standard", found=standard, expected="one of " + ", ".join(get_args(Standard))
         )
     if not (math.isfinite(class_) and class_ > 0.0):
-        raise ConfigurationError(
-            "channel frequency class", found=class_, expected="a positive number such as 1000"
-        )
+        raise ConfigurationError("channel frequency class", found=class_, expected="a positive number such as 1000")
     if not rate >= SAMPLES_PER_CLASS * class_:
         raise EstimationError(
             f"sampled too slowly for CFC{class_:g}",

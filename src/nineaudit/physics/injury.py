@@ -74,9 +74,7 @@ def gsi(acceleration: FloatArray, time: FloatArray) -> float:
     return float(_trapezoid(_checked(acceleration, time) ** 2.5, time)[-1])
 
 
-def a3ms(
-    acceleration: FloatArray, time: FloatArray, duration: float = 0.003, *, cumulative: bool = False
-) -> float:
+def a3ms(acceleration: FloatArray, time: FloatArray, duration: float = 0.003, *, cumulative: bool = False) -> float:
     """Highest level (m/s²) that the resultant `acceleration` (n,) m/s² holds for `duration` s (METHODS.md 6).
 
     Without a break; `cumulative`: summed over the record. Exact for the straight lines between samples, by

@@ -130,9 +130,7 @@ def orientation(omega: FloatArray, time: FloatArray, initial: FloatArray | None 
     from scipy.spatial.transform import Rotation
 
     if not np.isfinite(omega).all():
-        raise EstimationError(
-            "angular velocity has gaps", advice="fill or cut them before integrating attitude"
-        )
+        raise EstimationError("angular velocity has gaps", advice="fill or cut them before integrating attitude")
     steps = _steps(time, omega)
     coning = np.cross(omega[:-1], omega[1:]) * (steps**2 / 12.0)[:, None]
     vectors = np.vstack([np.zeros((1, 3)), np.diff(integrate(omega, time), axis=0) + coning])

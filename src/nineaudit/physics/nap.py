@@ -39,9 +39,7 @@ def _half_difference_rows(arms: FloatArray) -> tuple[FloatArray, FloatArray]:
     """U and D, each (3,9) 1/m."""
     arms = np.asarray(arms, dtype=np.float64)
     if arms.shape != (3,) or not np.isfinite(arms).all() or (arms == 0.0).any():
-        raise EstimationError(
-            "arms of a 3-2-2-2 array", found=arms.tolist(), expected="three lengths in m, none zero"
-        )
+        raise EstimationError("arms of a 3-2-2-2 array", found=arms.tolist(), expected="three lengths in m, none zero")
     rows = np.zeros((2, 3, 9))
     for axis, pair in enumerate(_HALF_DIFFERENCES):
         for side, (arm_channel, centre_channel, arm) in enumerate(pair):
@@ -72,9 +70,7 @@ def products(readings: FloatArray, arms: FloatArray) -> FloatArray:
     return np.asarray(readings @ product_rows(arms).T)
 
 
-def omega(
-    readings: FloatArray, arms: FloatArray, time: FloatArray, omega0: FloatArray | float = 0.0
-) -> FloatArray:
+def omega(readings: FloatArray, arms: FloatArray, time: FloatArray, omega0: FloatArray | float = 0.0) -> FloatArray:
     """ω (n,3) rad/s = `omega0` + ∫α, with `omega0` (3,) the ω of time[0]; `kinematics.integrate` rules."""
     return integrate(alpha(readings, arms), time, omega0)
 
@@ -117,9 +113,7 @@ def closed_form(channel: str, arms: FloatArray) -> ClosedForm:
     Raises ConfigurationError for another channel name, EstimationError as `alpha_rows`.
     """
     if channel not in CHANNELS:
-        raise ConfigurationError(
-            "not a 3-2-2-2 channel", found=channel, expected="one of " + ", ".join(CHANNELS)
-        )
+        raise ConfigurationError("not a 3-2-2-2 channel", found=channel, expected="one of " + ", ".join(CHANNELS))
     column, rows = CHANNELS.index(channel), product_rows(arms)
     holding = np.flatnonzero(rows[:, column])
     weights, direction = np.zeros(3), np.zeros(3)

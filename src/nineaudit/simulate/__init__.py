@@ -107,9 +107,7 @@ def simulate(
     healthy = _within_range(signal, rig.array)
     readings = inject(healthy, parsed, rig, truth, instrument, for_faults.spawn(len(parsed)))
     notes = (f"simulated motion {motion}, seed {seed}", *(f"injected fault {fault}" for fault in parsed))
-    recording = _recording(
-        rig, truth.time, readings, rate_hz, Path(f"simulation:{motion}:seed={seed}"), notes
-    )
+    recording = _recording(rig, truth.time, readings, rate_hz, Path(f"simulation:{motion}:seed={seed}"), notes)
     return Simulation(recording, truth, frozen(ideal), frozen(healthy), drawn, parsed)
 
 
@@ -131,10 +129,7 @@ def _stated(array: SensorArray, imperfect: bool) -> SensorArray:
     if imperfect:
         return array
     return SensorArray(
-        tuple(
-            replace(s, u_gain=0.0, u_zero=0.0, u_alignment=0.0, u_position=0.0, u_timing=0.0)
-            for s in array.sensors
-        )
+        tuple(replace(s, u_gain=0.0, u_zero=0.0, u_alignment=0.0, u_position=0.0, u_timing=0.0) for s in array.sensors)
     )
 
 
@@ -177,8 +172,6 @@ def _recording(
         valid=valid,
         rig=rig,
         source=Source(path, "simulation", hashlib.sha256(content).hexdigest(), len(content), notes=notes),
-        native=tuple(
-            Trace(s.channel, s.signal, time, readings[:, i]) for i, s in enumerate(rig.array.sensors)
-        ),
+        native=tuple(Trace(s.channel, s.signal, time, readings[:, i]) for i, s in enumerate(rig.array.sensors)),
         clocks=tuple(Clock(rate=rate, jitter=0.0) for _ in rig.array.sensors),
     )

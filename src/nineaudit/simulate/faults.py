@@ -82,9 +82,7 @@ def zero_shift(scene: Scene, value: float) -> FloatArray:
 
 def drift(scene: Scene, value: float) -> FloatArray:
     start = scene.time[0] if scene.at is None else scene.at
-    return np.asarray(
-        scene.column + value * np.clip((scene.time - start) / (scene.time[-1] - start), 0.0, 1.0)
-    )
+    return np.asarray(scene.column + value * np.clip((scene.time - start) / (scene.time[-1] - start), 0.0, 1.0))
 
 
 def polarity(scene: Scene, _: float) -> FloatArray:

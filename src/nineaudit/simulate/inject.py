@@ -37,9 +37,7 @@ def inject(
     for fault, stream in zip(faults, streams, strict=True):
         i = column(rig, fault.channel, fault)
         rng = np.random.default_rng(stream)
-        scene = Scene(
-            rig.array.sensors[i], i, out.copy(), truth, instrument, rng, _moment(fault, truth), fault.mode
-        )
+        scene = Scene(rig.array.sensors[i], i, out.copy(), truth, instrument, rng, _moment(fault, truth), fault.mode)
         value = resolve(fault, rig, scene)
         out[:, i] = FAULTS[fault.kind].apply(scene, value)
         if fault.kind == "swap":
@@ -122,9 +120,7 @@ def _moment(fault: Fault, truth: Truth) -> float | None:
     if fault.at is not None and not kind.timed:
         raise _wrong(fault, f"{fault.kind} has no beginning", "no @TIME")
     if fault.at is not None and not truth.time[0] <= fault.at < truth.time[-1]:
-        raise _wrong(
-            fault, "the time is not in the recording", f"{truth.time[0]:g} s to {truth.time[-1]:g} s"
-        )
+        raise _wrong(fault, "the time is not in the recording", f"{truth.time[0]:g} s to {truth.time[-1]:g} s")
     return fault.at
 
 

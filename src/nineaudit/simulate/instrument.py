@@ -45,9 +45,7 @@ def perfect(array: SensorArray) -> Instrument:
     return Instrument(array.positions, array.axes, array.is_accelerometer, nothing, nothing, nothing, noise)
 
 
-def draw(
-    array: SensorArray, streams: Sequence[np.random.SeedSequence]
-) -> tuple[Instrument, dict[str, FloatArray]]:
+def draw(array: SensorArray, streams: Sequence[np.random.SeedSequence]) -> tuple[Instrument, dict[str, FloatArray]]:
     """An instrument of the rig's uncertainties, one seed stream for each channel, and what was drawn.
 
     Drawn, SI: gain, zero, timing, noise (k,); tilt (k,2) rad towards the rows of `across`; position (k,3) m.
@@ -55,9 +53,7 @@ def draw(
     z = np.array([np.random.default_rng(stream).standard_normal(8) for stream in streams]).reshape(-1, 8)
     u = {name: array.values(f"u_{name}") for name in ("gain", "zero", "timing", "alignment", "position")}
     tilt, offset = z[:, 3:5] * u["alignment"][:, None], z[:, 5:8] * u["position"][:, None]
-    axes = array.axes + np.array([t @ across(n) for t, n in zip(tilt, array.axes, strict=True)]).reshape(
-        -1, 3
-    )
+    axes = array.axes + np.array([t @ across(n) for t, n in zip(tilt, array.axes, strict=True)]).reshape(-1, 3)
     instrument = Instrument(
         positions=array.positions + offset,
         axes=axes / np.linalg.norm(axes, axis=1, keepdims=True),

@@ -15,9 +15,7 @@ from nineaudit.simulate import faults
 from nineaudit.simulate.faults import Scene
 from nineaudit.units import factor
 
-Quantity = Literal[
-    "nothing", "channel", "fraction", "level", "factor", "time", "length", "frequency", "class"
-]
+Quantity = Literal["nothing", "channel", "fraction", "level", "factor", "time", "length", "frequency", "class"]
 
 PEAK: Final = "peak"
 """The unit of a level that is a fraction of the channel's own peak."""
@@ -60,19 +58,13 @@ class FaultKind:
 
 FAULTS: Final[dict[str, FaultKind]] = {
     "gain": FaultKind(faults.gain, "sensitivity off by a relative amount", "fraction", 0.10),
-    "zero_shift": FaultKind(
-        faults.zero_shift, "zero jumps at the event, or at @TIME", "level", 0.05, timed=True
-    ),
-    "drift": FaultKind(
-        faults.drift, "zero wanders in a straight line, this far at the end", "level", 0.05, timed=True
-    ),
+    "zero_shift": FaultKind(faults.zero_shift, "zero jumps at the event, or at @TIME", "level", 0.05, timed=True),
+    "drift": FaultKind(faults.drift, "zero wanders in a straight line, this far at the end", "level", 0.05, timed=True),
     "polarity": FaultKind(faults.polarity, "sign reversed", "nothing"),
     "swap": FaultKind(faults.swap, "connected as the other channel, and that as this", "channel"),
     "unit": FaultKind(faults.unit, "wrong unit: readings times a factor", "factor", 9.80665),
     "delay": FaultKind(faults.delay, "late by this time", "time", 1e-3),
-    "clipping": FaultKind(
-        faults.clipping, "flat above this part of its peak", "fraction", 0.5, low=0.0, high=1.0
-    ),
+    "clipping": FaultKind(faults.clipping, "flat above this part of its peak", "fraction", 0.5, low=0.0, high=1.0),
     "dropout": FaultKind(
         faults.dropout,
         "reads zero (hold, invalid) this long, about its peak or from @TIME",
@@ -90,14 +82,10 @@ FAULTS: Final[dict[str, FaultKind]] = {
         low=0.0,
         timed=True,
     ),
-    "spikes": FaultKind(
-        faults.spikes, "single samples off by this much, one in about 20 ms", "level", 1.0, timed=True
-    ),
+    "spikes": FaultKind(faults.spikes, "single samples off by this much, one in about 20 ms", "level", 1.0, timed=True),
     "noise": FaultKind(faults.noise, "white noise of this standard deviation added", "level", 0.05, low=0.0),
     "wrong_filter": FaultKind(faults.wrong_filter, "filtered with this class as well", "class", 60.0),
-    "ac_coupled": FaultKind(
-        faults.ac_coupled, "first-order high-pass, this corner", "frequency", 1.0, low=0.0
-    ),
+    "ac_coupled": FaultKind(faults.ac_coupled, "first-order high-pass, this corner", "frequency", 1.0, low=0.0),
     "cross_axis": FaultKind(faults.cross_axis, "this sensitivity to a direction across it", "fraction", 0.05),
     "position": FaultKind(
         faults.position,
@@ -177,9 +165,7 @@ def unknown_name(what: str, name: str, known: Iterable[str], text: str | None = 
     near = get_close_matches(name, names, n=1, cutoff=0.5)
     advice = f"did you mean {near[0]}?" if near else None
     place = "--fault" if text is None else f"--fault {text}"
-    return ConfigurationError(
-        what, place=place, found=name, expected="one of " + ", ".join(names), advice=advice
-    )
+    return ConfigurationError(what, place=place, found=name, expected="one of " + ", ".join(names), advice=advice)
 
 
 def _bad_value(text: str, name: str, kind: FaultKind) -> ConfigurationError:

@@ -1,0 +1,133 @@
+"""Diagnosis by the whole-record search, for any array: the hypotheses of estimate/search.py weighed.
+
+A channel is named when it holds the posterior against every other at 99 to 1, when the record without its fault costs
+what a healthy one does, and, where its fault is a mere waveform, when the motion also tells that waveform from a free
+one in any other channel. Otherwise those that are left are a group, and no name is given inside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from nineaudit.case import Case
+from nineaudit.diagnosis import SEPARATION, Candidate, Diagnosis, Status
+from nineaudit.estimate.hypotheses import Hypothesis
+from nineaudit.estimate.search import DETECTION_NATS, Search, smallest
+from nineaudit.estimate.trajectory import Fit
+
+ODDS_NATS = float(np.log(99.0))
+"""A name needs 99 to 1 against every other channel."""
+LARGEST_GROUP = 4
+"""A group of more channels than this helps nobody."""
+UNEXPLAINED = 1.5
+"""Cost per degree of freedom, over the best, that even the best hypothesis may leave before it explains nothing."""
+WAVEFORMS = ("unknown", "samples")
+UNIT_FACTORS = (9.80665, 57.29578, 1000.0, 100.0, 25.4, 2.54, 0.3048 * 9.80665)
+
+
+def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
+    """Diagnosis of a redundant array. `evidence`: channel -> fault word that its own trace shows, the word of a
+    hypothesis that leaves just those samples out. EstimationError where no motion can be fitted."""
+    search = case.search
+    best = search.found[0] if search.found else None
+    base = Diagnosis(Status.HEALTHY, (), (), "", healthy_statistic=search.healthy.statistic, limit=case.statistic_limit)
+    base = _with_sizes(case, search, base)
+    if best is None or best.evidence < DETECTION_NATS:
+        return _nothing_found(search, base)
+    candidates = _candidates(case, search, evidence)
+    floor = _floor(search)
+    at = f"{best.statistic:.2f} per degree of freedom, {search.healthy.statistic:.3g} with it at its word"
+    if (best.statistic > UNEXPLAINED * floor and best.word not in WAVEFORMS) or floor > UNEXPLAINED:
+        reason = f"something is wrong, but no fault of one or two channels explains it: at best {at}"
+        return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
+    group = _group(search, best, floor)
+    names = [tuple(case.array.channels[c] for c in channels) for channels in group]
+    if len(group) == 1:
+        fault = candidates[0].fault.replace("_", " ")
+        reason = f"{' and '.join(names[0])}: {fault}; without it the record is whole: {at}"
+        return replace(base, status=Status.ISOLATED, channels=names[0], candidates=candidates, reason=reason)
+    members = tuple(dict.fromkeys(name for channels in names for name in channels))
+    if len(members) > LARGEST_GROUP:
+        reason = f"something is wrong, but {len(members)} channels explain it about as well: {', '.join(members)}"
+        return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
+    reason = f"one of {', '.join(members)}: this motion cannot tell them apart; at best {at}"
+    return replace(base, status=Status.AMBIGUOUS, channels=members, candidates=candidates, reason=reason)
+
+
+def _nothing_found(search: Search, base: Diagnosis) -> Diagnosis:
+    statistic, limit = search.healthy.statistic, base.limit or np.inf
+    cost = f"{statistic:.2f} per degree of freedom, limit {limit:.2f}"
+    if not search.healthy.converged:
+        return replace(base, status=Status.UNDIAGNOSED, reason=f"the fit did not converge; {cost}")
+    if statistic > limit:
+        reason = f"noise and stated calibration errors do not explain the record ({cost}), and no channel stands out"
+        return replace(base, status=Status.UNDIAGNOSED, reason=reason)
+    return replace(base, reason=f"the record is that of one rigid body within the budget: {cost}")
+
+
+def _floor(search: Search) -> float:
+    """Cost per degree of freedom at the best: noise that is not what the rig says scales all evidence."""
+    return max(1.0, min(x.statistic for x in search.found))
+
+
+def _scores(search: Search) -> dict[tuple[int, ...], float]:
+    """Best evidence of each channel (or pair), in nats of the noise as found."""
+    scale = _floor(search)
+    out: dict[tuple[int, ...], float] = {}
+    for x in search.found:
+        out.setdefault(x.channels, x.evidence / scale)
+    return out
+
+
+def _group(search: Search, best: Hypothesis, floor: float) -> list[tuple[int, ...]]:
+    """The best channel, and every other that nothing sets apart from it."""
+    scores = _scores(search)
+    near = [c for c, score in scores.items() if scores[best.channels] - score < ODDS_NATS]
+    if best.word in WAVEFORMS and len(best.channels) == 1:
+        costs = {k: (f.cost - f.data.dof) / floor for k, f in search.without.items()}
+        mine = costs[best.channels[0]]
+        near += [(k,) for k, cost in costs.items() if cost - mine < SEPARATION and (k,) not in near]
+    return sorted(near, key=lambda c: -scores.get(c, -np.inf))
+
+
+def _candidates(case: Case, search: Search, evidence: Mapping[str, str]) -> tuple[Candidate, ...]:
+    """The best hypothesis of each channel or pair with its probability, most probable first."""
+    scores = _scores(search)
+    top = max(scores.values())
+    weight = {c: float(np.exp(max(s - top, -700.0))) for c, s in scores.items()}
+    total = sum(weight.values())
+    out = []
+    for channels in sorted(scores, key=lambda c: -scores[c]):
+        best = next(x for x in search.found if x.channels == channels)
+        names = tuple(case.array.channels[c] for c in channels)
+        word = evidence.get(names[0], "unknown") if best.word == "samples" else _word(best)
+        out.append(Candidate(names, word, weight[channels] / total, best.statistic, dict(best.parameters)))
+    return tuple(out)
+
+
+def _word(x: Hypothesis) -> str:
+    """The fault word of INTERFACE.md: a gain near −1 is a polarity, one near a ratio of units is a unit."""
+    if x.word != "gain":
+        return x.word
+    factor = x.parameters.get("factor", 1.0 + x.parameters.get("size", 0.0))
+    if abs(factor + 1.0) < 0.1:
+        return "polarity"
+    size = max(abs(factor), 1.0 / max(abs(factor), 1e-9))
+    return "unit" if any(abs(size / u - 1.0) < 0.1 for u in UNIT_FACTORS) else "gain"
+
+
+def _with_sizes(case: Case, search: Search, base: Diagnosis) -> Diagnosis:
+    """What would have shown and been pinned, about the fit without the best channel, in a record as noisy as this."""
+    at: Fit = search.healthy
+    if search.found and search.found[0].evidence > DETECTION_NATS:
+        at = search.without.get(search.found[0].channels[0], at)
+    detectable, isolable = smallest(at, case.onset, SEPARATION)
+    names = case.array.channels
+    return replace(
+        base,
+        smallest_detectable=dict(zip(names, detectable.tolist(), strict=True)),
+        smallest_isolable=dict(zip(names, isolable.tolist(), strict=True)),
+    )
