@@ -65,7 +65,7 @@ def report(trials: Sequence[Trial], command: str) -> str:
         "## Side by side\n\nPer cent named alone / right group / wrong name / undiagnosed or missed; for healthy "
         "recordings, per cent called faulty.\n\n" + side_by_side(trials),
         "## By motion: nineaudit\n\n" + by_motion(trials),
-        "## Wrong names, false alarms and crashes\n\nEach can be drawn again with `--case NAME`.\n\n"
+        "## Wrong names and groups, false alarms, crashes\n\nEach can be drawn again with `--case NAME`.\n\n"
         + failures(trials),
     ]
     return "\n\n".join(parts) + "\n"
@@ -85,8 +85,10 @@ ambiguous group that contains it. **wrong**: a name that is not the faulty chann
 culprit, or one of two swapped channels. **word**: of those named alone, the kind of fault is right too. Reconstruction,
 of those named alone, over the replaced samples after the event began: rms error over the Cramér–Rao bound of white
 noise σ√(h/(1−h)), over the rms of the stated u, and the share inside the stated 95 % interval; the truth is what the
-rig at its word would have read. **Above isolable**: the rms of the injected error from the event to the end exceeds
-the smallest isolable zero shift that the diagnosis states for that channel (the smaller ratio of a swapped pair).
+rig at its word would have read. **Above isolable**: the injected error is worth more than the smallest isolable zero
+shift that the diagnosis states for that channel (the smaller ratio of a swapped pair). It is worth its rms from the
+event to the end, or the zero shift that stands out as far from calibration errors where that is less; both are exact
+for a zero shift. A size stated as infinite is never exceeded.
 **Visible**: λ > {VISIBLE} for one who knows the waveform of the fault (`closed_forms.visibility`); what is not visible
 nobody can find among calibration errors of the stated size."""
 
@@ -235,7 +237,11 @@ def failures(trials: Sequence[Trial], most: int = 60) -> str:
     lines = []
     for t in sorted(trials, key=lambda t: (t.kind, t.name)):
         outcome = t.outcome(AUDIT)
-        if t.error or outcome is Outcome.WRONG or (t.kind == HEALTHY and outcome is not Outcome.MISSED):
+        if (
+            t.error
+            or outcome in (Outcome.WRONG, Outcome.OTHER)
+            or (t.kind == HEALTHY and outcome is not Outcome.MISSED)
+        ):
             status, named = t.answers[AUDIT]
             said = t.error or f"{status} {', '.join(named)}".strip()
             lines.append([f"{t.name}", t.motion, f"{t.noise_g:.2f}", t.fault or "none", said, f"{t.size:.1f}"])

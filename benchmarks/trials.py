@@ -111,14 +111,16 @@ def trial(name: str, seed: int = 0, preset: str = "naap-3222", least_signal: flo
     for method, ask in ((CLOSED_FORMS, closed_form_answer), (NAIVE, naive_answer)):
         answer = ask(audit.case)
         answers |= {} if answer is None else {method: answer}
+    healthy = _healthy(drawn)
+    visible = visibility(healthy, error) if drawn.fault else math.nan
     named = judge(answers[AUDIT], drawn.culprits) is Outcome.ALONE
     return Trial(
         **_plan(drawn),
         answers=answers,
         seconds=seconds,
         word=diagnosis.candidates[0].fault if named and diagnosis.candidates else None,
-        size=_size(drawn, audit, error),
-        visible=visibility(_healthy(drawn), error) if drawn.fault else math.nan,
+        size=_size(drawn, audit, error, healthy, visible),
+        visible=visible,
         statistic=diagnosis.healthy_statistic,
         rebuilt=_rebuilt(drawn, audit, answers),
     )
@@ -149,14 +151,20 @@ def injected(drawn: Draw, case: Case) -> FloatArray:
     return np.asarray(np.nan_to_num(case.readings - (healthy - zero)))
 
 
-def _size(drawn: Draw, audit: Audit, error: FloatArray) -> float:
-    """Rms of the injected error from t = 0 to the end over the stated smallest isolable size, which is a zero shift
-    at the event: exact for zero shifts, of equal energy for the others. The smaller one of a swapped pair."""
+def _size(drawn: Draw, audit: Audit, error: FloatArray, healthy: Case, visible: float) -> float:
+    """The zero shift at the event that the injected error is worth, over the stated smallest isolable one; the smaller
+    ratio of a swapped pair. It is worth its rms from t = 0 to the end, or, where that is less, the zero shift that
+    stands out as far from calibration errors (λ). Both are exact for a zero shift."""
     event, sizes = audit.case.time >= 0.0, audit.diagnosis.smallest_isolable
     ratios = []
     for channel in drawn.culprits:
-        rms = float(np.sqrt(np.mean(error[event, audit.case.array.index(channel)] ** 2)))
-        ratios.append(rms / sizes[channel] if sizes.get(channel) else 0.0)
+        column = audit.case.array.index(channel)
+        step = np.zeros_like(error)
+        step[event, column] = 1.0
+        worth = float(np.sqrt(np.mean(error[event, column] ** 2)))
+        alike = np.sqrt(visible / visibility(healthy, step))
+        worth = min(worth, float(alike)) if np.isfinite(alike) else worth
+        ratios.append(worth / sizes[channel] if sizes.get(channel) else 0.0)
     return min(ratios, default=math.nan)
 
 

@@ -95,7 +95,7 @@ def test_first_order_change_matches_the_simulated_instrument():
     rig = replace(RIG, array=SensorArray(tuple(replace(s, **small) for s in RIG.array.sensors)))
     drawn = simulate(rig, "general", seed=5, noise=False)
     motion = Motion(drawn.truth.omega, drawn.truth.alpha, drawn.truth.a0, "truth")
-    for i, sensor in enumerate(rig.array.sensors):
+    for i in range(len(rig.array)):
         columns = calibration.columns(rig.array, drawn.ideal, drawn.truth.time, motion)[:, i]
         theta = np.concatenate(
             [[drawn.drawn["gain"][i], drawn.drawn["zero"][i]], [0.0, 0.0], drawn.drawn["position"][i], [0.0]]

@@ -55,7 +55,7 @@ def diagnosis_sentence(diagnosis: Diagnosis) -> str:
         together = probability(sum(c.probability for c in diagnosis.candidates if set(c.channels) <= set(names)))
         return f"the fault is in {joined(names, 'or')}, probability {together}; this motion cannot tell them apart"
     if status == "healthy":
-        return "as one rigid body, no channel is at fault"
+        return "no channel contradicts the others"
     return f"no culprit named: {diagnosis.reason}" if diagnosis.reason else "no culprit named"
 
 
