@@ -103,3 +103,19 @@ def test_rebuilt_by_the_fit_within_its_uncertainty():
         assert rebuilt.bound_ratio < 1.1
         assert result.impact["peak α"].after > 0
     assert 0.6 < np.sqrt(np.mean(np.square(np.concatenate(ratios)))) < 1.4
+
+
+@pytest.mark.parametrize(
+    ("motion", "fault", "culprits"),
+    [
+        ("alem-quiet", None, set()),  # two seconds: the closed forms, linear in calibration, find 1.23 of 1.19
+        ("drop", "a0x:swap=a1y", {"a0x", "a1y"}),
+        ("sled", "a1z:swap=a3x", {"a1z", "a3x"}),  # the closed forms alone would name a1z
+    ],
+)
+def test_what_the_closed_forms_cannot_settle_goes_to_the_search(motion, fault, culprits):
+    rig = parse_rig(preset_text("naap-3222", arms=[50.0, 60.0, 70.0]))
+    seed = {"alem-quiet": 0, "drop": 1, "sled": 2}[motion]
+    result = audit(simulate(rig, motion, faults=[fault] if fault else [], seed=seed).recording)
+    assert set(result.diagnosis.channels) == culprits, result.diagnosis.reason
+    assert result.verdict == ("fail" if culprits else "pass")

@@ -134,6 +134,9 @@ def test_repair_refuses_what_it_must(clipped, tmp_path):
     group = audit(simulate(RIG, "planar", faults=["a3x:clipping=0.5"], seed=3).recording)
     with pytest.raises(ConfigurationError, match=r"one of (a3x, a1z|a1z, a3x),.*--channel"):
         repair(group, tmp_path / "z.csv")
+    swap = audit(simulate(RIG, "drop", faults=["a0x:swap=a1y"], seed=1).recording)
+    with pytest.raises(ConfigurationError, match=r"are at fault together.*--channel"):
+        repair(swap, tmp_path / "s.csv")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["T0001.csv", "repaired.csv"]
 
 

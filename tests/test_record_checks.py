@@ -353,3 +353,16 @@ def _table(path: Path) -> dict[str, FloatArray]:
     import pandas as pd
 
     return {name: column.to_numpy(dtype=float) for name, column in pd.read_csv(path).items()}
+
+
+def test_a_dithered_channel_that_eases_into_its_limit_is_clipped() -> None:
+    """The true curve only just exceeds the limit and touches it gently, as in the demo: 445 identical samples of a
+    channel whose noise is thousands of its steps are no rest."""
+    time = np.linspace(0.0, 1.0, 2000)
+    noise = 3.0 * np.random.default_rng(4).standard_normal(time.size)
+    healthy = 400.0 * np.sin(np.pi * time) ** 2 + 40.0 * np.sin(9.0 * time) * np.sin(np.pi * time) ** 4 + noise
+    clipped = np.minimum(healthy, 350.0)
+    (top,) = flat_tops(clipped, 3.0)
+    assert top.level == 350.0
+    assert top.samples == int((clipped == 350.0).sum())
+    assert not flat_tops(healthy, 3.0)

@@ -15,7 +15,7 @@ import numpy as np
 from nineaudit.case import Case
 from nineaudit.diagnosis import SEPARATION, Candidate, Diagnosis, Status
 from nineaudit.estimate.hypotheses import Hypothesis
-from nineaudit.estimate.search import DETECTION_NATS, Search, smallest
+from nineaudit.estimate.search import DETECTION_NATS, FAR, Search, smallest
 from nineaudit.estimate.trajectory import Fit
 
 ODDS_NATS = float(np.log(99.0))
@@ -87,9 +87,12 @@ def _group(search: Search, best: Hypothesis, floor: float) -> list[tuple[int, ..
     scores = _scores(search)
     near = [c for c, score in scores.items() if scores[best.channels] - score < ODDS_NATS]
     if best.word in WAVEFORMS and len(best.channels) == 1:
-        costs = {k: (f.cost - f.data.dof) / floor for k, f in search.without.items()}
-        mine = costs[best.channels[0]]
-        near += [(k,) for k, cost in costs.items() if cost - mine < SEPARATION and (k,) not in near]
+        mine = search.without[best.channels[0]]
+        for k, f in search.without.items():
+            apart = (f.cost - f.data.dof - mine.cost + mine.data.dof) / floor
+            # a fit that has not settled may still fall: it is no evidence against its channel unless far off
+            if apart < (SEPARATION if f.converged else FAR) and (k,) not in near:
+                near.append((k,))
     return sorted(near, key=lambda c: -scores.get(c, -np.inf))
 
 

@@ -29,6 +29,8 @@ from nineaudit.recording import Recording
 
 CFC_TO_PASS_BAND = 0.6
 """CFC number over its −3 dB frequency: the class is 1000 for 1650 Hz (SAE J211-1)."""
+DOUBTFUL = 3.0
+"""Cost over its limit up to which the linear closed forms are doubted."""
 NOMINAL_NOISE = 1e-3
 """Last resort for a noise level, as a part of the channel's peak, where neither rig nor recording tells."""
 
@@ -205,10 +207,17 @@ class Case:
     @property
     def statistic(self) -> float:
         """Cost per degree of freedom of the record with every channel at its word: by the closed forms for nine
-        accelerometers in the 3-2-2-2 layout, else of the whole-record fit. EstimationError where neither can tell."""
-        if self.closed_forms_apply:
-            return self.nap_healthy.statistic
-        return self.healthy.statistic
+        accelerometers in the 3-2-2-2 layout, else of the whole-record fit. EstimationError where neither can tell.
+
+        The closed forms are linear in the calibration errors, which over seconds of integration is not enough: a cost
+        somewhat above its limit is looked at again by the whole-record fit.
+        """
+        if not self.closed_forms_apply:
+            return self.healthy.statistic
+        quick = self.nap_healthy.statistic
+        if not 1.0 < quick / self.statistic_limit < DOUBTFUL or not self.healthy.converged:
+            return quick
+        return min(quick, self.healthy.statistic)
 
     @property
     def closed_forms_apply(self) -> bool:

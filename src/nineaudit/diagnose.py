@@ -1,6 +1,7 @@
 """Which channel? The right method for the array, and its answer (METHODS.md 3).
 
-nine accelerometers in the ideal 3-2-2-2 layout     closed forms (by_closed_form.py)
+nine accelerometers in the ideal 3-2-2-2 layout     closed forms (by_closed_form.py), which are quick; what they
+                                                    cannot settle goes to the search
 any other redundant array of up to 12 channels      whole-record search (by_search.py)
 larger arrays                                       parity, with and without what traces show wrong by themselves
 """
@@ -17,6 +18,9 @@ from nineaudit.diagnosis import Candidate, Diagnosis, Status
 from nineaudit.estimate import parity
 from nineaudit.estimate.search import FEW_CHANNELS
 
+SETTLED = 1.15
+"""Cost per degree of freedom up to which a record counts as whole without its culprit, noise being known to 10 %."""
+
 __all__ = ["Candidate", "Diagnosis", "Status", "diagnose"]
 
 
@@ -29,10 +33,23 @@ def diagnose(case: Case, evidence: Mapping[str, str] | None = None) -> Diagnosis
         reason = "the array has no redundancy: rigid-body constraints cannot show a fault in any channel"
         return Diagnosis(Status.UNDIAGNOSED, (), (), reason)
     if case.closed_forms_apply:
-        return by_closed_form(case, evidence or {})
+        quick = by_closed_form(case, evidence or {})
+        return quick if _settled(case, quick) else by_search(case, evidence or {})
     if len(case.array) <= FEW_CHANNELS:
         return by_search(case, evidence or {})
     return _of_parity(case, evidence or {})
+
+
+def _settled(case: Case, quick: Diagnosis) -> bool:
+    """Whether the closed forms' answer stands: healthy, or a culprit or group without which the record is whole.
+
+    They are linear in the calibration errors, and they know no fault of two channels.
+    """
+    if quick.status is Status.HEALTHY:
+        return True
+    if quick.status is Status.UNDIAGNOSED or case.statistic <= case.statistic_limit:
+        return False
+    return quick.candidates[0].statistic <= SETTLED
 
 
 def _of_parity(case: Case, evidence: Mapping[str, str]) -> Diagnosis:

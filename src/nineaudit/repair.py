@@ -113,11 +113,14 @@ def _reconstruction(audit: Audit, channel: str | None) -> Reconstruction:
         )
     if audit.reconstruction is not None and channel in (None, *audit.reconstruction.channels):
         return audit.reconstruction
+    status, group = audit.diagnosis.status, ", ".join(audit.diagnosis.channels)
+    if channel is None and status is Status.ISOLATED and len(audit.diagnosis.channels) == 1:
+        channel = audit.diagnosis.channels[0]  # mend says why it could not be rebuilt
     if channel is not None:
         return mend(audit.case, channel)
-    status, group = audit.diagnosis.status, ", ".join(audit.diagnosis.channels)
     what = {
         Status.HEALTHY: "no channel is faulty: there is nothing to repair",
+        Status.ISOLATED: f"{group} are at fault together, and one channel can be rebuilt at a time",
         Status.AMBIGUOUS: f"the culprit is one of {group}, and this recording cannot tell which",
     }.get(status, f"no channel was isolated: {audit.diagnosis.reason}")
     raise ConfigurationError(

@@ -117,7 +117,7 @@ def _best_width(
             for s in _flat_stretches(signal, near, top, width, cap)
             if (not noisy or _structureless(signal[s.start : s.stop]))
             and _arrives(signal, s, top, noise, width, at_rail)
-            and (at_rail or not _eases(signal, s, top, width))
+            and (at_rail or not _eases(signal, s, top, width, dithered=noise > DITHERED * width))
             and (at_rail or moving(s.start - 1, s.stop + 1))
         ]
         nats = sum(s.nats for s in flats)
@@ -173,18 +173,21 @@ def _arrives(signal: FloatArray, s: Stretch, top: float, noise: float, width: fl
 
 COARSE = 240.0
 """Part of the range at which easing is looked for besides the width itself: from a tenth of the range away."""
+DITHERED = 10.0
+"""Noise over the width of a stretch from which noise alone would have broken the stretch up."""
 EASED = 1.5
 """How much longer than at its own slope the signal must take to the level to count as coming to rest there."""
 
 
-def _eases(signal: FloatArray, s: Stretch, top: float, width: float) -> bool:
+def _eases(signal: FloatArray, s: Stretch, top: float, width: float, *, dithered: bool) -> bool:
     """Whether the signal slows down towards the level, at either end: a body that coasts, not an overload.
 
     A signal cut off at a level goes on at its slope up to it; one that settles there, as an angular rate after a
-    blow, eases in.
+    blow, eases in. Where noise of many widths would move a resting channel about (`dithered`), samples that stay
+    within one width do not rest, however gently the signal came.
     """
     sides = signal[: s.start + 1][::-1], signal[s.stop - 1 :]
-    scales = {width, max(width, float(np.ptp(signal)) / COARSE)}
+    scales = {width} if dithered else {width, max(width, float(np.ptp(signal)) / COARSE)}
     return any(_slows(top - side, scale) for side in sides for scale in scales)
 
 

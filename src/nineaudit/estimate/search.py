@@ -13,7 +13,7 @@ from nineaudit.estimate import hypotheses as h
 from nineaudit.estimate.hypotheses import Hypothesis
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import has_rates
-from nineaudit.estimate.trajectory import Fit
+from nineaudit.estimate.trajectory import Fit, fit
 from nineaudit.physics import rigid_body
 
 FEW_CHANNELS = 12
@@ -56,8 +56,9 @@ def search(healthy: Fit, onset: int, wrong: BoolArray, limit: float) -> Search:
     suspects = _suspects(healthy, small, wrong)
     without = _leave_out(data, healthy, suspects, small)
     close = _contenders(without, small, wrong)
+    without |= {k: fit(f.data, f.omega, f.theta) for k in close if not (f := without[k]).converged}
     found = [x for k in close for x in _closely(data, healthy, without[k], k, onset, wrong[:, k], small, reference)]
-    if not found or min(x.statistic for x in found) > min(limit, WHOLE):
+    if not found or max(found, key=lambda x: x.evidence).statistic > min(limit, WHOLE):
         found += _of_two(data, without, close, reference)
     return Search(healthy, tuple(sorted(found, key=lambda x: -x.evidence)), without)
 
