@@ -28,13 +28,20 @@ WAVEFORMS = ("unknown", "samples")
 UNIT_FACTORS = (9.80665, 57.29578, 1000.0, 100.0, 25.4, 2.54, 0.3048 * 9.80665)
 
 
-def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
-    """Diagnosis of a redundant array. `evidence`: channel -> fault word that its own trace shows, the word of a
-    hypothesis that leaves just those samples out. EstimationError where no motion can be fitted."""
+def by_search(case: Case, evidence: Mapping[str, str], quick: Diagnosis | None = None) -> Diagnosis:
+    """Diagnosis of a redundant array. EstimationError where no motion can be fitted.
+
+    `evidence`: channel -> fault word that its own trace shows, the word of a hypothesis that leaves just those samples
+    out. `quick`: an answer of the closed forms that did not settle the matter; its (larger) sizes are kept.
+    """
     search = case.search
     best = search.found[0] if search.found else None
     base = Diagnosis(Status.HEALTHY, (), (), "", healthy_statistic=search.healthy.statistic, limit=case.statistic_limit)
-    base = _with_sizes(case, search, base)
+    if quick is None:
+        base = _with_sizes(case, search, base)
+    else:
+        sizes = quick.smallest_detectable, quick.smallest_isolable
+        base = replace(base, smallest_detectable=sizes[0], smallest_isolable=sizes[1])
     if best is None or best.evidence < DETECTION_NATS:
         return _nothing_found(search, base)
     candidates = _candidates(case, search, evidence)

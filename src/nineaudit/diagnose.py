@@ -34,21 +34,36 @@ def diagnose(case: Case, evidence: Mapping[str, str] | None = None) -> Diagnosis
         return Diagnosis(Status.UNDIAGNOSED, (), (), reason)
     if case.closed_forms_apply:
         quick = by_closed_form(case, evidence or {})
-        return quick if _settled(case, quick) else by_search(case, evidence or {})
+        if quick.status is not Status.HEALTHY and case.statistic <= case.statistic_limit:
+            return _healthy_after_all(case, quick)
+        return quick if _settled(quick) else by_search(case, evidence or {}, quick)
     if len(case.array) <= FEW_CHANNELS:
         return by_search(case, evidence or {})
     return _of_parity(case, evidence or {})
 
 
-def _settled(case: Case, quick: Diagnosis) -> bool:
+def _healthy_after_all(case: Case, quick: Diagnosis) -> Diagnosis:
+    """The closed forms are linear in the calibration errors; the whole-record fit finds the record whole."""
+    cost = f"{case.statistic:.2f} per degree of freedom, limit {case.statistic_limit:.2f}"
+    return replace(
+        quick,
+        status=Status.HEALTHY,
+        channels=(),
+        candidates=(),
+        reason=f"the record is that of one rigid body within the budget: {cost}",
+        healthy_statistic=case.statistic,
+        limit=case.statistic_limit,
+        interval=None,
+    )
+
+
+def _settled(quick: Diagnosis) -> bool:
     """Whether the closed forms' answer stands: healthy, or a culprit or group without which the record is whole.
 
-    They are linear in the calibration errors, and they know no fault of two channels.
+    They know no fault of two channels.
     """
-    if quick.status is Status.HEALTHY:
-        return True
-    if quick.status is Status.UNDIAGNOSED or case.statistic <= case.statistic_limit:
-        return False
+    if quick.status in (Status.HEALTHY, Status.UNDIAGNOSED):
+        return quick.status is Status.HEALTHY
     return quick.candidates[0].statistic <= SETTLED
 
 

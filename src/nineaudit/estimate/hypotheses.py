@@ -22,6 +22,9 @@ from nineaudit.estimate.shapes import GAIN_SD, Shape, additive, any_curve, follo
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import Fit, Solved, eliminate, fit, log_determinant, normal_equations
 
+HOPELESS = 10.0
+"""Cost per degree of freedom at which a fit that has not fallen below it in three steps need not go on: all evidence is
+relative, and a record that costs so much is not that of a healthy instrument."""
 LOOK, ROUGH = 8, 1e-4
 """Iterations and tolerance of a fit that is only compared: a wrong hypothesis need not settle to be worse."""
 STRETCH_NATS = 8.0
@@ -43,7 +46,7 @@ class Hypothesis:
 
 def healthy_fit(data: Data) -> Fit:
     """The fit of the hypothesis that nothing is wrong. EstimationError where ω cannot be told."""
-    return fit(data, first_omega(data))
+    return fit(data, first_omega(data), hopeless=HOPELESS * data.dof)
 
 
 def log_evidence(found: Fit) -> float:
