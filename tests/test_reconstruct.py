@@ -165,3 +165,14 @@ def test_missing_samples_of_the_channel_are_always_replaced():
     rebuilt = rebuild_channel(case, "a0y", np.zeros(len(case.time), dtype=bool))
     assert rebuilt.replaced.sum() == 50
     assert np.isfinite(rebuilt.repaired).all()
+
+
+def test_a_rebuilt_rate_sensor_is_documented_in_its_own_unit(tmp_path):
+    rig = parse_rig(preset_text("naap-gyro"))
+    result = audit(simulate(rig, "general", faults=["gx:polarity"], seed=2).recording)
+    made = repair(result, tmp_path / "g.csv", channel="gx", now=NOW)
+    text = made.read_text(encoding="utf-8")
+    document = json.loads(text)
+    assert document["unit"] == "rad/s"
+    assert document["bound_ratio"] is None  # METHODS 4 has a bound for accelerometers
+    assert "NaN" not in text

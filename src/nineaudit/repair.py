@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -56,7 +57,7 @@ def repair(
             advice="run the repair again",
         )
     document = provenance(audit, rebuilt, output, reason, by, datetime.now(UTC) if now is None else now)
-    _write_atomically(made, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    _write_atomically(made, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     return made
 
 
@@ -91,8 +92,8 @@ def provenance(
         "method": rebuilt.method,
         "donors": list(rebuilt.donors),
         "u_rms": rebuilt.u_rms,
-        "unit": "m/s^2",
-        "bound_ratio": rebuilt.bound_ratio,
+        "unit": "m/s^2" if rig.array[rebuilt.channels[0]].kind == "accelerometer" else "rad/s",
+        "bound_ratio": rebuilt.bound_ratio if math.isfinite(rebuilt.bound_ratio) else None,
         "diagnosis": {
             "status": str(diagnosis.status),
             "channels": list(diagnosis.channels),

@@ -16,7 +16,6 @@ from nineaudit.estimate import calibration
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, has_rates
 from nineaudit.physics import rigid_body
 
-SOURCES = ("gain", "zero", "alignment", "position", "timing", "noise")
 _MEMBERS = {
     "gain": ("gain",),
     "zero": ("zero",),

@@ -40,10 +40,6 @@ class Search:
     found: tuple[Hypothesis, ...]
     without: dict[int, Fit]
 
-    def best(self, channel: int) -> Hypothesis | None:
-        """The best hypothesis of one channel alone."""
-        return next((x for x in self.found if x.channels == (channel,)), None)
-
 
 def search(healthy: Fit, onset: int, wrong: BoolArray, limit: float) -> Search:
     """Compare the hypotheses about the readings of the `healthy` fit. `onset` first sample of the event; `wrong` (n,k)
