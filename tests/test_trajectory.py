@@ -13,20 +13,10 @@ import oracle_smoother as oracle
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import calibration, trajectory
-from nineaudit.estimate.model import (
-    Data,
-    added_of,
-    bent,
-    columns_at,
-    columns_of,
-    ideal,
-    jacobian,
-    middle,
-    motion_of,
-    residual,
-    total_cost,
-)
+from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import Motion
+from nineaudit.estimate.normal import Normal, Solved, by_nodes, eliminate, normal_equations
+from nineaudit.estimate.point import Point, point
 from nineaudit.estimate.posterior import posterior
 from nineaudit.estimate.start import first_omega
 from nineaudit.physics import rigid_body
@@ -36,18 +26,35 @@ R = 0.05
 ARRAY = scattered()
 
 
-def small_point(seed: int = 2) -> tuple[Data, FloatArray, FloatArray, FloatArray]:
-    """A tiny problem, and ω, θ and columns at no special point of it."""
+def small_point(seed: int = 2) -> tuple[Data, FloatArray, FloatArray]:
+    """A tiny problem, and ω and θ at no special point of it."""
     data = tiny(ARRAY)
     rng = np.random.default_rng(seed)
     omega = rng.standard_normal((len(data.time) + 1, 3)) * 10.0
-    theta = rng.standard_normal(len(data.channel))
-    return data, omega, theta, columns_at(data, omega, theta)
+    return data, omega, rng.standard_normal(len(data.channel))
+
+
+def middle(omega: FloatArray) -> FloatArray:
+    return 0.5 * (omega[1:] + omega[:-1])
 
 
 def cost(data: Data, omega: FloatArray, theta: FloatArray) -> float:
     """The cost with skews that follow the motion."""
-    return total_cost(data, omega, theta, columns_at(data, omega, theta))
+    return point(data, omega, theta, point(data, omega, theta).columns).cost
+
+
+def border(normal: Normal) -> FloatArray:
+    """Hωθ (3(n+1),q), whole."""
+    return normal.border(0, len(normal.diagonal)).reshape(len(normal.channel), -1).T
+
+
+def alone(solved: Solved) -> FloatArray:
+    """Hωω⁻¹ gω."""
+    return solved.factor.solve(solved.normal.gradient_omega[:, None])[:, 0]
+
+
+def solved_at(found: trajectory.Fit) -> Solved:
+    return eliminate(normal_equations(found.point))
 
 
 def without_skew(data: Data) -> Data:
@@ -58,15 +65,20 @@ def without_skew(data: Data) -> Data:
 
 
 def test_jacobian_is_the_derivative_of_the_residual_by_the_nodes() -> None:
-    data, omega, theta, columns = small_point()
-    found, step = jacobian(data, middle(omega)), 1e-3  # readings are quadratic in ω: central differences are exact
-    correction = added_of(data, columns, theta)
+    data, omega, theta = small_point()
+    data, theta = without_skew(data), theta[: len(without_skew(data).channel)]  # a skew's column is held in a step
+    at, step = point(data, omega, theta), 1e-3  # readings are quadratic in ω: central differences are exact
+    found = np.concatenate(by_nodes(at), axis=1).transpose(2, 0, 1)
+
+    def residual(changed: FloatArray) -> FloatArray:
+        return point(data, changed, theta, at.columns).z.T
+
     for node in range(len(omega)):
         for axis in range(3):
             up, down = omega.copy(), omega.copy()
             up[node, axis] += step
             down[node, axis] -= step
-            slope = -(residual(data, up, correction) - residual(data, down, correction)) / (2 * step)
+            slope = -(residual(up) - residual(down)) / (2 * step)
             expected = np.zeros_like(slope)
             for sample, column in ((node, axis), (node - 1, 3 + axis)):
                 if 0 <= sample < len(data.time):
@@ -92,14 +104,18 @@ def off(data: Data, channel: int, parameter: int, change: float) -> Data:
 
 def test_columns_are_the_derivatives_of_the_residual_by_the_calibration() -> None:
     """A residual falls by w D dθ when the instrument is known to be off by dθ; a0 held."""
-    data, omega, _, _ = small_point()
-    rng = np.random.default_rng(3)
-    motion = replace(motion_of(data, omega, 0.0), a0=rng.standard_normal((len(data.time), 3)) * 50.0)
-    data = replace(data, readings=ideal(data, motion))  # so that the gain acts on the same reading either way
-    columns, (channel, parameter) = columns_of(data, motion, np.zeros(len(data.channel))), data.active
+    data, omega, _ = small_point()
+    rng, theta = np.random.default_rng(3), np.zeros(len(data.channel))
+    motion = replace(point(data, omega, theta).motion, a0=rng.standard_normal((len(data.time), 3)) * 50.0)
+    perfect = rigid_body.predict(
+        data.array.positions, data.array.axes, data.array.is_accelerometer, motion.a0, motion.alpha, motion.omega
+    )
+    data = replace(data, readings=perfect)  # so that the gain acts on the same reading either way, and a0 is a0
+    columns, (channel, parameter) = point(data, omega, theta).columns.T, data.active
 
     def left(changed: Data) -> FloatArray:
-        return residual(changed, omega, motion.a0 @ changed.axes_a.T)
+        axes = changed.bent(theta).axes_a
+        return point(changed, omega, theta).z.T - changed.weight * (motion.a0 @ axes.T)
 
     for q in np.flatnonzero(parameter < 7):
         step = 1e-6 * data.prior_sd[channel[q], parameter[q]]
@@ -111,10 +127,10 @@ def test_columns_are_the_derivatives_of_the_residual_by_the_calibration() -> Non
 
 def test_gradients_are_half_the_slope_of_the_cost() -> None:
     """Exactly so with everything free but time skews, whose column is held during a step."""
-    data, omega, _, _ = small_point()
+    data, omega, _ = small_point()
     data = without_skew(data)
     theta = 3.0 * np.random.default_rng(4).standard_normal(len(data.channel))
-    normal = trajectory.normal_equations(data, omega, theta, columns_at(data, omega, theta))
+    normal = normal_equations(point(data, omega, theta))
     rng, step = np.random.default_rng(5), 1e-4
     for _ in range(20):
         along_omega, along_theta = rng.standard_normal(omega.shape), rng.standard_normal(theta.shape)
@@ -125,17 +141,16 @@ def test_gradients_are_half_the_slope_of_the_cost() -> None:
         assert -(up - down) / (2 * step) == pytest.approx(2 * downhill, rel=1e-5, abs=1e-6 * size)
 
 
-def dense_normal(
-    data: Data, omega: FloatArray, theta: FloatArray, columns: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def dense_normal(at: Point) -> tuple[FloatArray, FloatArray]:
     """Normal matrix and downhill gradient of (ω, θ), from one dense Jacobian by all unknowns, a0 eliminated last.
 
     Written sample by sample from y = (1+g)(n + τ)·(a0 + α×r' + ω×(ω×r')) + b − s dy/dt, r' = r + e (METHODS.md 1),
     with derivatives by differences of it.
     """
+    data, omega, theta, columns = at.data, at.omega, at.theta, at.columns.T
     n, k, nodes = len(data.time), len(data.array), len(omega)
     sizes = (3 * nodes, len(theta), 3 * n)
-    a0 = motion_of(bent(data, theta), omega, added_of(data, columns, theta)).a0
+    a0 = at.motion.a0
 
     def predicted(x: FloatArray) -> FloatArray:
         w, t, a = x[: sizes[0]].reshape(-1, 3), x[sizes[0] : sizes[0] + sizes[1]], x[-sizes[2] :].reshape(-1, 3)
@@ -174,11 +189,11 @@ def test_normal_equations_are_those_of_one_dense_problem() -> None:
     rng = np.random.default_rng(7)
     omega = rng.standard_normal((7, 3)) * 10.0
     theta = rng.standard_normal(len(data.channel))
-    columns = columns_at(data, omega, theta)
+    at = point(data, omega, theta)
     for _ in range(20):  # a0 and the skews' columns settle on each other
-        columns = columns_at(data, omega, theta, columns)
-    matrix, gradient = dense_normal(data, omega, theta, columns)
-    normal = trajectory.normal_equations(data, omega, theta, columns)
+        at = point(data, omega, theta, at.columns)
+    matrix, gradient = dense_normal(at)
+    normal = normal_equations(at)
     w = omega.size
     found = np.zeros((w, w))
     for t in range(7):
@@ -189,17 +204,21 @@ def test_normal_equations_are_those_of_one_dense_problem() -> None:
     scale = np.sqrt(np.diag(matrix))
     close = {"rtol": 0.0, "atol": 1e-6}
     assert np.allclose(found / np.outer(scale[:w], scale[:w]), matrix[:w, :w] / np.outer(scale[:w], scale[:w]), **close)
-    border = np.outer(scale[:w], scale[w:])
-    assert np.allclose(normal.border / border, matrix[:w, w:] / border, **close)
+    edge = np.outer(scale[:w], scale[w:])
+    assert np.allclose(border(normal) / edge, matrix[:w, w:] / edge, **close)
     corner = np.outer(scale[w:], scale[w:])
     assert np.allclose(normal.dense / corner, matrix[w:, w:] / corner, **close)
     both = np.concatenate([normal.gradient_omega, normal.gradient_theta])
     assert np.allclose(both / scale, gradient / scale, rtol=0.0, atol=1e-6 * np.abs(gradient / scale).max())
 
-    solved = trajectory.eliminate(normal)
+    solved = eliminate(normal)
     assert np.allclose(np.linalg.inv(solved.schur), np.linalg.inv(matrix)[w:, w:], rtol=1e-5, atol=1e-8)
     step_theta = np.linalg.solve(solved.schur, solved.pull)
-    step = np.concatenate([solved.alone - solved.through @ step_theta, step_theta])
+    step = np.concatenate([solved.step(step_theta).ravel(), step_theta])
+    assert np.allclose(
+        step[:w], alone(solved) - solved.through() @ step_theta, rtol=0.0, atol=1e-9 * np.abs(step).max()
+    )
+    assert solved.fall == pytest.approx(float(normal.gradient_omega @ alone(solved)), rel=1e-9)
     decrement = float(both @ step)
     assert decrement == pytest.approx(float(gradient @ np.linalg.solve(matrix, gradient)), rel=1e-5)
 
@@ -213,9 +232,8 @@ def test_gradient_vanishes_at_the_optimum(preset: str) -> None:
     asked = problem(preset, "general", 3)
     found = trajectory.fit(asked.data, asked.omega)
     assert found.converged
-    solved = trajectory.eliminate(trajectory.normal_equations(asked.data, found.omega, found.theta, found.columns))
-    normal = solved.normal
-    gain = float(normal.gradient_omega @ solved.alone) + float(solved.pull @ np.linalg.solve(solved.schur, solved.pull))
+    solved = solved_at(found)
+    gain = solved.fall + float(solved.pull @ np.linalg.solve(solved.schur, solved.pull))
     assert 0.0 <= gain <= 0.02
 
 
@@ -224,12 +242,12 @@ def test_no_direction_lowers_the_cost_noticeably(preset: str) -> None:
     """Also with calibration columns that follow the motion: half a posterior standard deviation any way costs ¼."""
     asked = problem(preset, "oblique", 5)
     found = trajectory.fit(asked.data, asked.omega)
-    solved = trajectory.eliminate(trajectory.normal_equations(asked.data, found.omega, found.theta, found.columns))
+    solved = solved_at(found)
     rng, least = np.random.default_rng(0), cost(asked.data, found.omega, found.theta)
     for _ in range(10):
         step_theta = np.linalg.solve(np.linalg.cholesky(solved.schur).T, rng.standard_normal(len(found.theta)))
         step_theta *= 0.5 / np.sqrt(step_theta @ solved.schur @ step_theta)
-        step_omega = -(solved.through @ step_theta).reshape(-1, 3)
+        step_omega = -(solved.through() @ step_theta).reshape(-1, 3)
         for sign in (-1.0, 1.0):
             moved = cost(asked.data, found.omega + sign * step_omega, found.theta + sign * step_theta)
             assert moved - least == pytest.approx(0.25, abs=0.1)
@@ -506,7 +524,9 @@ def test_motion_of_the_whole_laboratory_goes_into_a0(asked: Problem, answer: tra
     certain = data.prior_sd * np.array([0, 1, 0, 0, 1, 1, 1, 0])
     common = np.random.default_rng(2).standard_normal((len(data.time), 3)) * 100.0
     one = trajectory.fit(replace(data, prior_sd=certain), asked.omega)
-    pushed = replace(data, prior_sd=certain, readings=data.readings + common @ data.axes_a.T)
+    pushed = replace(
+        data, prior_sd=certain, readings=data.readings + common @ data.bent(np.zeros(len(data.channel))).axes_a.T
+    )
     other = trajectory.fit(pushed, asked.omega)
     close_fits(one, other)
     assert np.abs(other.motion.a0 - one.motion.a0 - common).max() <= 1e-3

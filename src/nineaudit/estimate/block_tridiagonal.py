@@ -34,6 +34,26 @@ class Factor:
             raise EstimationError(f"banded solution failed (LAPACK dpbtrs info {info})")
         return np.asarray(solution)
 
+    def forward(self, right: FloatArray, first: int, last: FloatArray) -> FloatArray:
+        """U⁻ᵀ right, A = UᵀU, of the nodes from `first` on: (q,3m) from `right` (q,m,3), with the solution `last` (q,3)
+        of the node before. `right` is overwritten."""
+        from scipy.linalg.lapack import dtbtrs
+
+        count, nodes, _ = right.shape
+        here = slice(3 * first, 3 * (first + nodes))
+        if first:
+            right[:, 0] -= last @ self._coupling(first)
+        columns = right.reshape(count, 3 * nodes).T
+        solution, info = dtbtrs(self.banded[:, here], columns, uplo="U", trans="T", overwrite_b=1)
+        if info != 0:
+            raise EstimationError(f"banded substitution failed (LAPACK dtbtrs info {info})")
+        return np.asarray(solution.T)
+
+    def _coupling(self, node: int) -> FloatArray:
+        """(3,3) block of U between the node before and `node`."""
+        above, column = np.mgrid[0:3, 0:3]
+        return np.asarray(self.banded[_HALF_BANDWIDTH - 3 + above - column, 3 * node + column])
+
     def log_determinant(self) -> float:
         """ln det A, from the diagonal of the factor."""
         return 2.0 * float(np.log(self.banded[_HALF_BANDWIDTH]).sum())

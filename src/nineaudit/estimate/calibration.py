@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nineaudit.array import FloatArray, Sensor, SensorArray
+from nineaudit.array import BoolArray, FloatArray, Sensor, SensorArray
 from nineaudit.estimate.motion import Motion
 from nineaudit.physics import kinematics
 
@@ -40,6 +40,36 @@ def prior_sd(sensor: Sensor) -> FloatArray:
     return np.array([sensor.u_gain, sensor.u_zero, tilt, tilt, position, position, position, sensor.u_timing])
 
 
+def features(a0: FloatArray, alpha: FloatArray, omega: FloatArray) -> FloatArray:
+    """(15,n) what every reading of a rigid body is linear in: a0, B = [α×] + [ω×][ω×] row by row, and ω.
+
+    A point r has the specific force a(r) = a0 + B r. `a0`, `alpha`, `omega` (3,n).
+    """
+    (ax, ay, az), (x, y, z) = alpha, omega
+    xx, yy, zz, xy, yz, zx = x * x, y * y, z * z, x * y, y * z, z * x
+    spin = (-yy - zz, xy - az, zx + ay, xy + az, -zz - xx, yz - ax, zx - ay, yz + ax, -xx - yy)
+    return np.vstack([a0, *spin, omega])
+
+
+def sensing(axes: FloatArray, positions: FloatArray, held: BoolArray) -> FloatArray:
+    """(k,15) the reading of each sensor from features(): n·(a0 + B r), or n·ω where not `held` (accelerometers)."""
+    felt = np.hstack([axes, (axes[:, :, None] * positions[:, None, :]).reshape(-1, 9)])
+    nothing = np.zeros_like(axes)
+    return np.where(held[:, None], np.hstack([felt, nothing]), np.hstack([np.zeros_like(felt), axes]))
+
+
+def sensitivities(axes: FloatArray, positions: FloatArray, held: BoolArray, across: FloatArray) -> FloatArray:
+    """(k,6,15) change of a reading per unit of gain, tilts and position, from features(). `across` (k,2,3): the
+    directions of the tilts."""
+    out = np.zeros((len(axes), 6, 15))
+    out[:, 0] = sensing(axes, positions, held)
+    for j in range(2):
+        out[:, 1 + j] = sensing(across[:, j], positions, held)
+    for j in range(3):
+        out[:, 3 + j, 3 + j : 12 + j : 3] = np.where(held[:, None], axes, 0.0)
+    return out
+
+
 def columns(
     array: SensorArray, readings: FloatArray, time: FloatArray, motion: Motion, across: FloatArray | None = None
 ) -> FloatArray:
@@ -47,27 +77,16 @@ def columns(
 
     `readings` (n,k) SI without gaps, `time` (n,) s, `motion` of the body. Where a0 is not known (NaN), the tilts
     count as zero and are not budgeted. `across` (k,2,3): directions of the tilts, if not those of perpendicular().
-    With B = [α×] + [ω×][ω×], a(r) = a0 + B r.
     """
-    spin = _cross_matrix(motion.alpha) + _cross_matrix(motion.omega) @ _cross_matrix(motion.omega)
-    sensed = np.nan_to_num(motion.a0)[:, None, :] + np.einsum("nij,kj->nki", spin, array.positions)
-    held = array.is_accelerometer[:, None]
-    sensed = np.where(held, sensed, motion.omega[:, None, :])
     across = perpendiculars(array) if across is None else across
+    known = features(np.nan_to_num(motion.a0).T, motion.alpha.T, motion.omega.T)
+    by = sensitivities(array.axes, array.positions, array.is_accelerometer, across)[:, 1:]
     out = np.empty((*readings.shape, 8))
     out[:, :, 0] = readings
     out[:, :, 1] = 1.0
-    out[:, :, 2:4] = np.einsum("kji,nki->nkj", across, sensed)
-    out[:, :, 4:7] = np.where(held, np.einsum("ki,nij->nkj", array.axes, spin), 0.0)
+    out[:, :, 2:7] = (by.reshape(-1, 15) @ known).reshape(len(array), 5, -1).transpose(2, 0, 1)
     out[:, :, 7] = -kinematics.differentiate(readings, time)
     return out
-
-
-def _cross_matrix(vectors: FloatArray) -> FloatArray:
-    """[v×] (n,3,3) of v (n,3)."""
-    out = np.zeros((len(vectors), 3, 3))
-    out[:, 2, 1], out[:, 0, 2], out[:, 1, 0] = vectors.T
-    return out - out.transpose(0, 2, 1)
 
 
 def prior_sds(array: SensorArray) -> FloatArray:

@@ -17,10 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray, IntArray
-from nineaudit.estimate.model import Data, Extra, columns_at, cost_of, residual, total_cost
+from nineaudit.estimate.model import Data, Extra
+from nineaudit.estimate.normal import Solved, eliminate, normal_equations
+from nineaudit.estimate.point import point
 from nineaudit.estimate.shapes import GAIN_SD, Shape, additive, any_curve, following
 from nineaudit.estimate.start import first_omega
-from nineaudit.estimate.trajectory import Fit, Solved, eliminate, fit, log_determinant, normal_equations
+from nineaudit.estimate.trajectory import Fit, fit, log_determinant
 
 HOPELESS = 10.0
 """Cost per degree of freedom at which a fit that has not fallen below it in three steps need not go on: all evidence is
@@ -71,7 +73,7 @@ def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) ->
     if data.array.is_accelerometer[channel]:
         starts.append(first_omega(alone))
     theta = np.zeros(len(alone.channel))
-    costs = [cost_of(alone, residual(alone, w, np.zeros_like(alone.readings)), w, theta) for w in starts]
+    costs = [point(alone, w, theta).cost for w in starts] if len(starts) > 1 else [0.0]
     return fit(alone, starts[int(np.argmin(costs))], iterations=LOOK, tolerance=ROUGH, hopeless=hopeless)
 
 
@@ -79,7 +81,7 @@ def confirm(data: Data, near: Fit, claim: Hypothesis, reference: float) -> Hypot
     """The evidence of a shape by a fit of its own, where `claim` had it linear about another fit."""
     if claim.shape is None:
         return claim
-    width = claim.shape.columns.shape[1]
+    width = len(claim.shape.columns)
     extra = Extra(claim.shape.columns, np.full(width, claim.channels[0]))
     whole = replace(data, extra=extra)
     found = fit(whole, near.omega, theta_for(whole, near), tolerance=ROUGH)
@@ -226,10 +228,9 @@ def step_sds(at: Fit, onset: int, free: int | None = None) -> FloatArray:
     data = at.data if free is None else masked(at.data, free)
     count = len(data.array)
     step = (np.arange(len(data.time)) >= onset).astype(float)
-    whole = replace(data, extra=Extra(np.repeat(step[:, None], count, axis=1), np.arange(count)))
+    whole = replace(data, extra=Extra(np.repeat(step[None], count, axis=0), np.arange(count)))
     theta = theta_for(whole, at)
-    columns = columns_at(whole, at.omega, theta)
-    solved = eliminate(normal_equations(whole, at.omega, theta, columns))
+    solved = eliminate(normal_equations(point(whole, at.omega, theta)))
     base = len(theta) - count
     out = np.full(count, np.inf)
     for k in range(count):
@@ -255,15 +256,14 @@ def _compare(
     data: Data, omega: FloatArray, theta: FloatArray, shapes: Sequence[tuple[int, Shape]], reference: float
 ) -> list[Hypothesis]:
     """Evidence of each shape beside the calibration errors, linear about ω and θ."""
-    widths = [s.columns.shape[1] for _, s in shapes]
+    widths = [len(s.columns) for _, s in shapes]
     channel = np.repeat([k for k, _ in shapes], widths)
-    whole = replace(data, extra=Extra(np.hstack([s.columns for _, s in shapes]), channel))
+    whole = replace(data, extra=Extra(np.vstack([s.columns for _, s in shapes]), channel))
     base = len(theta)
     theta = np.concatenate([theta, np.zeros(len(channel))])
-    columns = columns_at(whole, omega, theta)
-    cost = total_cost(whole, omega, theta, columns)
-    solved = eliminate(normal_equations(whole, omega, theta, columns))
-    settled = cost - float(solved.normal.gradient_omega @ solved.alone)
+    here = point(whole, omega, theta)
+    solved = eliminate(normal_equations(here))
+    settled = here.cost - solved.fall
     found, first = [], base
     for (k, shape), width in zip(shapes, widths, strict=True):
         rows = np.r_[np.arange(base), np.arange(first, first + width)]

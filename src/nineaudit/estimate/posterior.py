@@ -17,8 +17,9 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.estimate import block_tridiagonal
-from nineaudit.estimate.model import Data, bent, jacobian, middle
-from nineaudit.estimate.trajectory import Fit, eliminate, normal_equations
+from nineaudit.estimate.normal import by_nodes, eliminate, normal_equations
+from nineaudit.estimate.point import Point
+from nineaudit.estimate.trajectory import Fit
 from nineaudit.physics import rigid_body
 
 
@@ -67,10 +68,10 @@ class Posterior:
 
     def acceleration_sd(self, point: FloatArray, axis: FloatArray) -> FloatArray:
         """(n,) standard uncertainty of the specific force at `point` (3,) m along `axis` (3,)."""
-        data, omega = self.fit.data, middle(self.fit.omega)
+        data, omega = self.fit.data, self.fit.motion.omega
         half = 0.5 * rigid_body.centripetal_jacobian(point[None], axis[None], omega)[:, 0]
         slope = np.cross(point, axis) / data.step[:, None]
-        through_omega, through_theta = a0_response(self.fit)
+        through_omega, through_theta = a0_response(self.fit.point)
         by_omega = np.hstack([half - slope, half + slope]) + np.einsum("i,nij->nj", axis, through_omega)
         by_theta = np.einsum("i,niq->nq", axis, through_theta)
         return self.sd(by_omega, by_theta, np.broadcast_to(axis, (len(half), 3)))
@@ -84,33 +85,38 @@ class Posterior:
         return self.sd(rows, np.zeros(self.through.shape[::2]))
 
 
-def a0_response(fit: Fit) -> tuple[FloatArray, FloatArray]:
+def a0_response(at: Point) -> tuple[FloatArray, FloatArray]:
     """Derivatives of a0 = (AᵀA)⁻¹ Aᵀ w(y − known(ω) − Dθ) by ω at the two nodes (n,3,6) and by θ (n,3,q)."""
-    data = bent(fit.data, fit.theta)
-    solver = _inverse_gram(data) @ (data.weight[:, :, None] * data.axes_a).transpose(0, 2, 1)
-    by_omega = -solver @ jacobian(data, middle(fit.omega))
-    by_theta = -solver[:, :, data.channel] * (data.weight[:, data.channel] * fit.columns)[:, None, :]
+    data = at.data
+    weighted = at.instrument.axes_a * data.weight[:, :, None]
+    solver = _inverse_gram(at) @ weighted.transpose(0, 2, 1)
+    by_omega = -solver @ np.concatenate(by_nodes(at), axis=1).transpose(2, 0, 1)
+    by_theta = -solver[:, :, data.channel] * (data.weight[:, data.channel] * at.columns.T)[:, None, :]
     return np.asarray(by_omega), np.asarray(by_theta)
 
 
-def _inverse_gram(data: Data) -> FloatArray:
-    return np.asarray(np.linalg.pinv(data.gram, rcond=1e-9, hermitian=True))
+def _inverse_gram(at: Point) -> FloatArray:
+    """(n,3,3) (AᵀA)⁻¹, A = w n of the accelerometers."""
+    axes = at.instrument.axes_a
+    gram = (at.data.weight**2 @ (axes[:, :, None] * axes[:, None, :]).reshape(-1, 9)).reshape(-1, 3, 3)
+    return np.asarray(np.linalg.pinv(gram, rcond=1e-9, hermitian=True))
 
 
 def posterior(fit: Fit) -> Posterior:
     """Covariances at the fitted point. EstimationError where the readings do not determine ω."""
-    normal = normal_equations(fit.data, fit.omega, fit.theta, fit.columns)
+    at = fit.point
+    normal = normal_equations(at)
     solved = eliminate(normal)
     diagonal, upper = block_tridiagonal.inverse_blocks(normal.diagonal, normal.upper)
     n = len(fit.data.time)
     pair = np.empty((n, 6, 6))
     pair[:, :3, :3], pair[:, 3:, 3:] = diagonal[:-1], diagonal[1:]
     pair[:, :3, 3:], pair[:, 3:, :3] = upper, upper.transpose(0, 2, 1)
-    through = solved.through.reshape(n + 1, 3, len(fit.theta))
+    through = solved.through().reshape(n + 1, 3, len(fit.theta))
     return Posterior(
         fit=fit,
         pair=pair,
         through=np.concatenate([through[:-1], through[1:]], axis=1),
         theta=np.asarray(np.linalg.inv(solved.schur)),
-        a0=_inverse_gram(bent(fit.data, fit.theta)),
+        a0=_inverse_gram(at),
     )

@@ -36,7 +36,7 @@ LOW_PASSES: Final = (60.0, 180.0)
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """One kind of fault: the fault `word`, its `columns` (n,e) of one prior standard deviation, the `scale` (e,) of
+    """One kind of fault: the fault `word`, its `columns` (e,n) of one prior standard deviation, the `scale` (e,) of
     its parameters (amplitude times scale, SI), `choices`, how many alike were tried (Occam), and a `note`: the instant,
     time constant or class tried."""
 
@@ -56,20 +56,20 @@ def following(fit: Fit, channel: int) -> list[Shape]:
     truth, sensor, time = fit.ideal[:, channel], data.array.sensors[channel], data.time
     one = np.ones(1)
     found = [
-        Shape("gain", GAIN_SD * truth[:, None], GAIN_SD * one),
-        Shape("delay", -DELAY_SD * kinematics.differentiate(truth[:, None], time), DELAY_SD * one),
+        Shape("gain", GAIN_SD * truth[None], GAIN_SD * one),
+        Shape("delay", -DELAY_SD * kinematics.differentiate(truth, time)[None], DELAY_SD * one),
     ]
     if sensor.kind == "accelerometer":
         alone = calibration.columns(data.array.select([channel]), truth[:, None], time, fit.motion)[:, 0]
-        found.append(Shape("cross_axis", TILT_SD * alone[:, 2:4], np.full(2, TILT_SD)))
-        found.append(Shape("position", POSITION_SD * alone[:, 4:7], np.full(3, POSITION_SD)))
+        found.append(Shape("cross_axis", TILT_SD * alone[:, 2:4].T, np.full(2, TILT_SD)))
+        found.append(Shape("position", POSITION_SD * alone[:, 4:7].T, np.full(3, POSITION_SD)))
     for constant in TIME_CONSTANTS:
         lost = _smoothed(truth, time, constant)
-        found.append(Shape("ac_coupled", -lost[:, None], one, len(TIME_CONSTANTS), constant))
+        found.append(Shape("ac_coupled", -lost[None], one, len(TIME_CONSTANTS), constant))
     for class_ in LOW_PASSES:
         constant = 1.0 / (2.0 * np.pi * class_ / 0.6)
         twice = _smoothed(_smoothed(truth, time, constant)[::-1], time, constant)[::-1]
-        found.append(Shape("wrong_filter", (twice - truth)[:, None], one, len(LOW_PASSES), class_))
+        found.append(Shape("wrong_filter", (twice - truth)[None], one, len(LOW_PASSES), class_))
     return found
 
 
@@ -79,7 +79,7 @@ def additive(data: Data, channel: int, peak: float, onset: int, onsets: int = ON
     span, one = float(time[-1] - time[onset]), np.ones(1)
     found = [Shape("drift", size * _ramp(time, onset, span), size * one)]
     for start in np.unique(np.linspace(onset, len(time) - 2, onsets).astype(int)):
-        step = (np.arange(len(time)) >= start).astype(float)[:, None]
+        step = (np.arange(len(time)) >= start).astype(float)[None]
         found.append(Shape("zero_shift", size * step, size * one, onsets, float(time[start])))
     return found
 
@@ -91,14 +91,14 @@ def any_curve(data: Data, channel: int, peak: float, onset: int) -> Shape:
 
 
 def hats(count: int, onset: int) -> FloatArray:
-    """(n,24) overlapping triangles from the onset to the end: any curve that changes no faster."""
+    """(24,n) overlapping triangles from the onset to the end: any curve that changes no faster."""
     centres = np.linspace(onset, count - 1, HATS)
     width = centres[1] - centres[0]
-    return np.asarray(np.maximum(1.0 - np.abs(np.arange(count)[:, None] - centres) / width, 0.0))
+    return np.asarray(np.maximum(1.0 - np.abs(np.arange(count) - centres[:, None]) / width, 0.0))
 
 
 def _ramp(time: FloatArray, onset: int, span: float) -> FloatArray:
-    return np.asarray(np.clip((time - time[onset]) / max(span, 1e-12), 0.0, 1.0)[:, None])
+    return np.asarray(np.clip((time - time[onset]) / max(span, 1e-12), 0.0, 1.0)[None])
 
 
 def _smoothed(values: FloatArray, time: FloatArray, constant: float) -> FloatArray:
