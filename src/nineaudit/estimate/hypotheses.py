@@ -22,13 +22,13 @@ from nineaudit.estimate.normal import Solved, eliminate, normal_equations
 from nineaudit.estimate.point import point
 from nineaudit.estimate.shapes import GAIN_SD, Shape, additive, any_curve, following
 from nineaudit.estimate.start import first_omega
-from nineaudit.estimate.trajectory import Fit, fit, log_determinant
+from nineaudit.estimate.trajectory import ROUGH, Fit, fit, log_determinant
 
 HOPELESS = 10.0
 """Cost per degree of freedom at which a fit that has not fallen below it in three steps need not go on: all evidence is
 relative, and a record that costs so much is not that of a healthy instrument."""
-LOOK, ROUGH = 8, 1e-4
-"""Iterations and tolerance of a fit that is only compared: a wrong hypothesis need not settle to be worse."""
+LOOK = 8
+"""Iterations of a fit that is only compared."""
 STRETCH_NATS = 8.0
 """What one stretch of wrong samples costs: its place and its length, out of some thousands."""
 
@@ -84,7 +84,7 @@ def confirm(data: Data, near: Fit, claim: Hypothesis, reference: float) -> Hypot
     width = len(claim.shape.columns)
     extra = Extra(claim.shape.columns, np.full(width, claim.channels[0]))
     whole = replace(data, extra=extra)
-    found = fit(whole, near.omega, theta_for(whole, near), tolerance=ROUGH)
+    found = fit(whole, near.omega, theta_for(whole, near))
     evidence = log_evidence(found) - reference - float(np.log(claim.shape.choices))
     parameters = _parameters(claim.shape, found.theta[-width:])
     return replace(claim, evidence=evidence, statistic=found.statistic, parameters=parameters)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,20 @@ from nineaudit.estimate.motion import Motion
 from nineaudit.estimate.normal import eliminate, normal_equations
 from nineaudit.estimate.point import Point, point
 
-ITERATIONS, TOLERANCE, SMALLEST_STEP = 25, 1e-5, 1e-3
+ITERATIONS, SMALLEST_STEP, ROUNDING = 25, 1e-3, 1e-10
+
+
+class Tolerance(NamedTuple):
+    """A step is the last when it gains less than `gain` of the cost, or what the normal equations promised to
+    `promise` of it: the cost is then quadratic about here, and the next step would gain less than the difference."""
+
+    gain: float
+    promise: float
+
+
+EXACT = Tolerance(1e-5, 1e-7)
+ROUGH = Tolerance(1e-4, 3e-5)
+"""Of a fit that is only compared: a wrong hypothesis need not settle to be worse."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +80,10 @@ def fit(
     start: FloatArray,
     theta: FloatArray | None = None,
     iterations: int = ITERATIONS,
-    tolerance: float = TOLERANCE,
+    tolerance: Tolerance = EXACT,
     hopeless: float = np.inf,
 ) -> Fit:
-    """Minimise the cost from ω `start` (n+1,3) until a step gains less than `tolerance` of it.
+    """Minimise the cost from ω `start` (n+1,3) until it settles to `tolerance`.
 
     A fit that has not settled within `iterations`, or still costs more than `hopeless` after three, says so:
     `converged`. EstimationError where ω is not determined.
@@ -79,15 +93,17 @@ def fit(
         solved = eliminate(normal_equations(here))
         step_theta = np.asarray(np.linalg.solve(solved.schur, solved.pull), dtype=np.float64)
         step_omega = solved.step(step_theta)
-        scale, previous = 1.0, here.cost
+        scale, previous, promised = 1.0, here.cost, solved.fall + float(solved.pull @ step_theta)
         while True:
             trial = point(data, here.omega + scale * step_omega, here.theta + scale * step_theta, here.columns)
-            if trial.cost <= previous or scale < SMALLEST_STEP:
+            if trial.cost <= previous * (1.0 + ROUNDING) or scale < SMALLEST_STEP:
                 break
             scale *= 0.25
-        here = trial
-        converged = abs(previous - here.cost) <= tolerance * (here.cost + data.dof)
-        if converged or (iteration >= 3 and here.cost > hopeless):
+        here, stuck = trial, trial.cost > previous * (1.0 + ROUNDING)
+        size = here.cost + data.dof
+        gained, missed = abs(previous - here.cost), abs(previous - promised - here.cost)
+        converged = gained <= tolerance.gain * size or missed <= tolerance.promise * size
+        if converged or stuck or (iteration >= 3 and here.cost > hopeless):
             break
     return Fit(data, here.omega, here.theta, here.cost, converged, iteration, log_determinant(solved.schur))
 
