@@ -37,10 +37,21 @@ class Extra:
 
 
 @dataclass(frozen=True, eq=False)
+class Between:
+    """What a coarse recording does not see between its samples (between_samples.py): at each sample ω and α differ from
+    the midpoint rule's by `mean` (n,6), rad/s and rad/s², and by errors of standard deviation `sd` (n,6) that all
+    channels share; `omega` (n,3) near which they act."""
+
+    omega: FloatArray
+    mean: FloatArray
+    sd: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Data:
     """What is fitted: `time` (n,) s, `readings` (n,k) SI zeroed (any number where the weight is 0), `weight` (n,k)
     1/σ or 0, `prior_sd` (k,8) of calibration.PARAMETERS (0: certain), `still` (n+1,) precision (s²/rad²) with which
-    ω = 0 is known at each node, 0 where it is not, and `extra` fault shapes."""
+    ω = 0 is known at each node, 0 where it is not, `extra` fault shapes, and what happens `between` coarse samples."""
 
     array: SensorArray
     time: FloatArray
@@ -49,6 +60,7 @@ class Data:
     prior_sd: FloatArray
     still: FloatArray
     extra: Extra | None = None
+    between: Between | None = None
 
     @cached_property
     def used(self) -> BoolArray:

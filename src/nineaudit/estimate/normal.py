@@ -129,10 +129,10 @@ def _corner(weighted: FloatArray, g: FloatArray, channel: IntArray) -> FloatArra
     for start in range(0, samples, STRETCH):
         here = slice(start, min(start + STRETCH, samples))
         c = np.ascontiguousarray(weighted[:, here])
-        explained = np.empty((count, 3, c.shape[1]))
+        explained = np.empty((count, len(g), c.shape[1]))
         for rows, k in _runs(channel):
             np.multiply(c[rows, None, :], g[None, :, k, here], out=explained[rows])
-        flat = explained.reshape(count, 3 * c.shape[1])
+        flat = explained.reshape(count, len(g) * c.shape[1])
         out += np.where(channel[:, None] == channel, c @ c.T, 0.0) - flat @ flat.T
     return out
 

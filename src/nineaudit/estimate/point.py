@@ -19,6 +19,7 @@ from nineaudit.estimate import calibration
 from nineaudit.estimate.instrument import Instrument
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import Motion
+from nineaudit.estimate.shared import SharedElimination, shared_elimination
 from nineaudit.physics import kinematics
 
 _UNSENSED, _NOTHING = 1e-12, 1e-300
@@ -34,9 +35,13 @@ class Elimination:
     g: FloatArray
 
     def a0(self, explained: FloatArray) -> FloatArray:
-        """(3,n) L⁻ᵀ (G z) of `explained` (3,n)."""
+        """(3,n) L⁻ᵀ (G z) of `explained` (3,n) (or 9, shared.py)."""
         (i00, i10, i11, i20, i21, i22), (x, y, z) = self.root, explained
         return np.stack([i00 * x + i10 * y + i20 * z, i11 * y + i21 * z, i22 * z])
+
+    def errors(self, explained: FloatArray) -> FloatArray:
+        """(6,n) errors of ω and α that the channels share: none."""
+        return np.zeros((6, explained.shape[1]))
 
 
 def elimination(axes_a: FloatArray, weight: FloatArray) -> Elimination:
@@ -59,8 +64,8 @@ def elimination(axes_a: FloatArray, weight: FloatArray) -> Elimination:
 @dataclass(frozen=True, eq=False)
 class Point:
     """ω (n+1,3) at the nodes and θ (q,), the `instrument` θ describes, `mean` ω̄ and `alpha` (3,n) at the samples, the
-    weighted residual `z` (k,n) and what a0 explains of it, `explained` (3,n), the `columns` D (q,n), change of its
-    channel's reading by one prior standard deviation of each θ, and the `cost`."""
+    weighted residual `z` (k,n) and what a0 explains of it, `explained` (3,n) (or 9, shared.py), the `columns` D (q,n),
+    change of its channel's reading by one prior standard deviation of each θ, and the `cost`."""
 
     data: Data
     omega: FloatArray
@@ -69,7 +74,7 @@ class Point:
     mean: FloatArray
     alpha: FloatArray
     z: FloatArray
-    elimination: Elimination
+    elimination: Elimination | SharedElimination
     explained: FloatArray
     columns: FloatArray
 
@@ -84,21 +89,25 @@ class Point:
     @cached_property
     def motion(self) -> Motion:
         """ω, α and a0 at the samples."""
-        a0 = self.elimination.a0(self.explained)
-        return Motion(self.mean.T, self.alpha.T, a0.T, "whole-record maximum a posteriori fit")
+        a0, alpha, omega = self._at_samples
+        return Motion(omega.T, alpha.T, a0.T, "whole-record maximum a posteriori fit")
+
+    @cached_property
+    def _at_samples(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(3,n) a0, α and ω, with what happens between the samples."""
+        off = self.elimination.errors(self.explained)
+        return self.elimination.a0(self.explained), self.alpha + off[3:], self.mean + off[:3]
 
     @cached_property
     def ideal(self) -> FloatArray:
         """(n,k) readings of a perfect instrument in this motion."""
-        a0 = self.elimination.a0(self.explained)
         perfect = self.data.bent(np.zeros_like(self.theta))
-        return np.asarray(perfect.predict(calibration.features(a0, self.alpha, self.mean)).T)
+        return np.asarray(perfect.predict(calibration.features(*self._at_samples)).T)
 
     @cached_property
     def correction(self) -> FloatArray:
         """(n,k) what calibration errors and fault shapes add to the perfect readings."""
-        a0 = self.elimination.a0(self.explained)
-        there = self.instrument.predict(calibration.features(a0, self.alpha, self.mean))
+        there = self.instrument.predict(calibration.features(*self._at_samples))
         return np.asarray((there + added(self.data, self.theta, self.columns)).T) - self.ideal
 
 
@@ -110,16 +119,29 @@ def point(data: Data, omega: FloatArray, theta: FloatArray, near: FloatArray | N
     there = data.bent(theta)
     mean = np.ascontiguousarray(0.5 * (omega[1:] + omega[:-1]).T)
     alpha = np.ascontiguousarray(np.diff(omega, axis=0).T) / data.step
+    if data.between is not None:
+        mean, alpha = mean + data.between.mean.T[:3], alpha + data.between.mean.T[3:]
     known = calibration.features(np.zeros_like(mean), alpha, mean)
     readings, weight = data.rows
     z = weight * (readings - there.predict(known) - added(data, theta, near))
-    free = elimination(there.axes_a, weight)
+    free = _elimination(data, there)
     explained = np.einsum("ikn,kn->in", free.g, z)
-    known[:3] = free.a0(explained)
+    if data.between is None:
+        known[:3] = free.a0(explained)
+    else:
+        off = free.errors(explained)
+        known = calibration.features(free.a0(explained), alpha + off[3:], mean + off[:3])
     columns = _columns(data, there, known)
     z -= weight * (_skewed(data, theta, columns) - _skewed(data, theta, near))
     explained = np.einsum("ikn,kn->in", free.g, z)
     return Point(data, omega, theta, there, mean, alpha, z, free, explained, columns)
+
+
+def _elimination(data: Data, there: Instrument) -> Elimination | SharedElimination:
+    weight = data.rows[1]
+    if data.between is None:
+        return elimination(there.axes_a, weight)
+    return shared_elimination(there, weight, data.between)
 
 
 def added(data: Data, theta: FloatArray, columns: FloatArray) -> FloatArray:
