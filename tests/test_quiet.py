@@ -106,6 +106,7 @@ def test_blocks_follow_the_pass_band_and_never_blur_a_head_impact():
     assert block_length(20_000, 20_000.0, 1650.0) == 10
     assert block_length(6_734, 62.5, None) == 1
     assert 10_000.0 / block_length(2_000_000, 10_000.0, None) >= 1500.0
+    assert 10_000.0 / block_length(2_000_000, 10_000.0, None, slowest=1000.0) == 1000.0
 
 
 def test_blocks_without_a_valid_sample_are_invalid():

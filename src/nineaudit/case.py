@@ -24,7 +24,7 @@ from nineaudit.estimate.search import Search, search
 from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
 from nineaudit.estimate.start import make_data
 from nineaudit.estimate.trajectory import Fit
-from nineaudit.physics import nap
+from nineaudit.physics import filters, nap
 from nineaudit.recording import Recording
 
 CFC_TO_PASS_BAND = 0.6
@@ -162,12 +162,16 @@ class Case:
     def _condense(self, readings: FloatArray) -> condense.Condensed:
         cfc = self.recording.rig.cfc
         pass_band = None if cfc is None else cfc / CFC_TO_PASS_BAND
-        length = condense.block_length(len(self.time), self.recording.rate, pass_band)
+        slowest = condense.SLOWEST_BLOCKS if self.array.is_accelerometer.all() else condense.WITH_RATES
+        length = condense.block_length(len(self.time), self.recording.rate, pass_band, slowest)
         rest = None if self.rest is None else self.readings[self.rest.samples]
+        rate = self.recording.rate
+        slow = cfc is None or rate < filters.SAMPLES_PER_CLASS * cfc
+        filtered = None if cfc is None or slow else filters.mean_noise(cfc, rate, length)
         return condense.Condensed(
             condense.block_means(self.time, length),
             condense.block_means(readings, length),
-            condense.block_noise(self.sigma, rest, length),
+            condense.block_noise(self.sigma, rest, length, filtered),
             length,
         )
 

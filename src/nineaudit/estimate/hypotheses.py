@@ -188,10 +188,12 @@ def _price(data: Data, left: Fit, channel: int) -> float:
 
 
 def noisy(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis | None:
-    """The channel with more noise than stated, the factor from what it leaves of the others' prediction."""
+    """The channel with more noise than stated, the factor from what it leaves of the others' prediction; None where
+    that does not change sign from sample to sample like noise."""
     weight = data.weight[:, channel]
-    off = weight * (data.readings[:, channel] - left.ideal[:, channel])
-    factor = float(np.sqrt(max(float(np.median(off[weight > 0] ** 2)) / 0.455 - 1.6, 0.0)))
+    off = (weight * (data.readings[:, channel] - left.ideal[:, channel]))[weight > 0]
+    levels, changes = (float(np.median(x**2)) / 0.455 for x in (off, np.diff(off) / np.sqrt(2.0)))
+    factor = float(np.sqrt(max(min(levels, 2.0 * changes) - 1.6, 0.0)))
     if factor < 1.5:
         return None
     weights = data.weight.copy()
@@ -202,32 +204,52 @@ def noisy(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis |
     return Hypothesis((channel,), "noise", log_evidence(found) - price - reference, found.statistic, {"factor": factor})
 
 
-def swapped(data: Data, pair: tuple[int, int], reference: float, near: FloatArray) -> Hypothesis:
+def swapped(data: Data, pair: tuple[int, int], reference: float, hopeless: float) -> Hypothesis:
     """Two channels taken for each other: the readings, with their weights, change places."""
     order = np.arange(len(data.array))
     order[list(pair)] = order[list(pair[::-1])]
-    found = fit(replace(data, readings=data.readings[:, order], weight=data.weight[:, order]), near, None, LOOK, ROUGH)
+    changed = replace(data, readings=data.readings[:, order], weight=data.weight[:, order])
+    found = fit(changed, first_omega(changed), None, LOOK, ROUGH, hopeless)
     return Hypothesis(pair, "swap", log_evidence(found) - reference, found.statistic)
 
 
-def swap_starts(data: Data, pairs: Sequence[tuple[int, int]]) -> list[tuple[float, tuple[int, int], FloatArray]]:
-    """Cost per degree of freedom of each swap after two steps without calibration, best first, with its ω."""
+def swap_costs(healthy: Fit, pairs: Sequence[tuple[int, int]], most: int) -> list[tuple[float, tuple[int, int]]]:
+    """Cost per degree of freedom of each swap after two steps without calibration over `most` samples, best first."""
+    data = coarser(healthy, most).data
     certain, out = replace(data, prior_sd=np.zeros_like(data.prior_sd)), []
     for pair in pairs:
         order = np.arange(len(data.array))
         order[list(pair)] = order[list(pair[::-1])]
         changed = replace(certain, readings=data.readings[:, order], weight=data.weight[:, order])
-        found = fit(changed, first_omega(changed), iterations=2)
-        out.append((found.statistic, pair, found.omega))
-    return sorted(out, key=lambda item: item[0])
+        out.append((fit(changed, first_omega(changed), iterations=2).statistic, pair))
+    return sorted(out)
 
 
-def step_sds(at: Fit, onset: int, free: int | None = None) -> FloatArray:
-    """(k,) standard deviation (SI) with which a step at the onset in each channel would be known, beside everything
-    else; `free`: with that channel's waveform free (infinite for itself). ∞ where it could not be told at all."""
+def coarser(at: Fit, most: int) -> Fit:
+    """The fit at every so many nodes, with means of the readings between them, at most about `most`: what the record
+    tells of slow faults is the same."""
+    data, length = at.data, -(-len(at.data.time) // most)
+    if length == 1:
+        return at
+    whole = len(data.time) // length
+    squares, readings, time = (
+        values[: whole * length].reshape(whole, length, *values.shape[1:])
+        for values in (data.weight**2, data.readings, data.time)
+    )
+    total = squares.sum(axis=1)
+    mean = (squares * readings).sum(axis=1) / np.where(total > 0, total, 1.0)
+    still = data.still[: whole * length + 1 : length]
+    part = replace(data, time=time.mean(axis=1), readings=mean, weight=np.sqrt(total), still=still, extra=None)
+    return replace(at, data=part, omega=at.omega[: whole * length + 1 : length], theta=theta_for(part, at))
+
+
+def step_sds(at: Fit, onset: float, free: int | None = None) -> FloatArray:
+    """(k,) standard deviation (SI) with which a step at the `onset` (s) in each channel would be known, beside
+    everything else; `free`: with that channel's waveform free (infinite for itself). ∞ where it could not be told at
+    all."""
     data = at.data if free is None else masked(at.data, free)
     count = len(data.array)
-    step = (np.arange(len(data.time)) >= onset).astype(float)
+    step = (data.time >= onset).astype(float)
     whole = replace(data, extra=Extra(np.repeat(step[None], count, axis=0), np.arange(count)))
     theta = theta_for(whole, at)
     solved = eliminate(normal_equations(point(whole, at.omega, theta)))

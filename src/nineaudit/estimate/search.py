@@ -27,6 +27,10 @@ WHOLE = 1.1
 FAR, HOPELESS = 300.0, 2.0
 """Cost by which a channel's absence may mend less than the best one's; cost per degree of freedom over the lowest at
 which a fit without a channel is given up."""
+CLOSE_NATS = 20.0
+"""Linear evidence under the best shape's at which another needs no fit of its own."""
+ENOUGH = 800
+"""Samples that tell as much of a step as any more."""
 WORTH_NATS = 4.0
 """Linear evidence below which no small fault needs a closer look."""
 
@@ -55,7 +59,7 @@ def search(healthy: Fit, onset: int, wrong: BoolArray, limit: float) -> Search:
     without |= {k: fit(f.data, f.omega, f.theta) for k in close if not (f := without[k]).converged}
     found = [x for k in close for x in _closely(data, healthy, without[k], k, onset, wrong[:, k], small, reference)]
     if not found or max(found, key=lambda x: x.evidence).statistic > min(limit, WHOLE):
-        found += _of_two(data, without, close, reference)
+        found += _of_two(healthy, without, close, min((x.statistic for x in found), default=np.inf), reference)
     return Search(healthy, tuple(sorted(found, key=lambda x: -x.evidence)), without)
 
 
@@ -126,21 +130,28 @@ def _closely(
     shapes = [(x, healthy) for x in small if x.channels == (channel,)]
     shapes += [(x, left) for x in h.curves(data, left, channel, onset, reference)]
     shapes.sort(key=lambda pair: -pair[0].evidence)
-    found = [h.confirm(data, near, x, reference) for x, near in shapes[:CONFIRMED]]
+    likely = [pair for pair in shapes[:CONFIRMED] if pair[0].evidence > shapes[0][0].evidence - CLOSE_NATS]
+    found = [h.confirm(data, near, x, reference) for x, near in likely]
     found.append(h.any_waveform(data, left, channel, reference))
-    tried = (h.scaled(data, left, channel, reference), h.noisy(data, left, channel, reference))
+    # where a small gain mends the record, a large one is the same
+    mended = found[0].word == "gain" and found[0].statistic <= WHOLE
+    tried = (None if mended else h.scaled(data, left, channel, reference), h.noisy(data, left, channel, reference))
     found += [x for x in tried if x is not None]
     if wrong.any():
         found.append(h.without_samples(data, left, channel, wrong, reference))
     return found
 
 
-def _of_two(data: Data, without: dict[int, Fit], close: Sequence[int], reference: float) -> list[Hypothesis]:
-    """No single channel mends the record: two of them swapped, or two of them free."""
+def _of_two(
+    healthy: Fit, without: dict[int, Fit], close: Sequence[int], best: float, reference: float
+) -> list[Hypothesis]:
+    """No single channel mends the record (`best`: what it costs at best): two of them swapped, or two of them free."""
+    data = healthy.data
     kinds = data.array.is_accelerometer
     among = list(without) if len(without) <= FEW_CHANNELS else list(close)
     pairs = [(i, j) for i, j in combinations(among, 2) if kinds[i] == kinds[j]]
-    found = [h.swapped(data, pair, reference, near) for _, pair, near in h.swap_starts(data, pairs)[:2]]
+    hopeless = HOPELESS * best * data.dof
+    found = [h.swapped(data, pair, reference, hopeless) for _, pair in h.swap_costs(healthy, pairs, ENOUGH)[:2]]
     for i, j in combinations(close, 2):
         if not _determined_without(data, i, j):
             continue
@@ -153,10 +164,11 @@ def _of_two(data: Data, without: dict[int, Fit], close: Sequence[int], reference
 def smallest(at: Fit, onset: int, separation: float) -> tuple[FloatArray, FloatArray]:
     """(k,) size of a step at the onset that would be detected, and that would be told from every other channel's
     free waveform (λ = `separation`), SI; ∞ where no size would do."""
-    alone = h.step_sds(at, onset)
+    begin, at = float(at.data.time[onset]), h.coarser(at, ENOUGH)
+    alone = h.step_sds(at, begin)
     detect = alone * np.sqrt(2.0 * DETECTION_NATS + 2.0 * np.log(30.0))
     used = np.flatnonzero((at.data.weight > 0).any(axis=0)).tolist()
-    rivals = np.stack([h.step_sds(at, onset, free=j) for j in used])
+    rivals = np.stack([h.step_sds(at, begin, free=j) for j in used])
     for row, j in enumerate(used):
         rivals[row, j] = 0.0
     return detect, np.maximum(detect, rivals.max(axis=0) * np.sqrt(separation))

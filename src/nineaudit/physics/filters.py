@@ -24,6 +24,7 @@ Standard = Literal["J211", "ISO6487"]
 _DESIGN_FACTOR: Final[dict[str, float]] = {"J211": 2.0775, "ISO6487": 1.25 * 5.0 / 3.0}
 SAMPLES_PER_CLASS: Final = 10.0
 """Sampling rate over CFC, at least (SAE J211-1)."""
+_FREQUENCIES = 4096
 
 
 def coefficients(
@@ -61,6 +62,17 @@ def response(frequency: FloatArray, class_: float, rate: float, standard: Standa
     delay = np.exp(-2j * np.pi * np.asarray(frequency) / rate)
     once = (b[0] + b[1] * delay + b[2] * delay**2) / (1.0 - a[0] * delay - a[1] * delay**2)
     return np.asarray(np.abs(once) ** 2)
+
+
+def mean_noise(class_: float, rate: float, length: int) -> float:
+    """Variance of the mean of `length` samples of white noise behind the filter, over σ²/length (1 for white noise).
+
+    length ∫|H D|² df / ∫|H|² df, D = sin(length x)/(length sin x) with x = πf/rate the response of the mean.
+    """
+    frequency = (np.arange(_FREQUENCIES) + 0.5) / _FREQUENCIES * rate / 2.0
+    power, x = response(frequency, class_, rate) ** 2, np.pi * frequency / rate
+    mean = np.sin(length * x) / (length * np.sin(x))
+    return float(length * (power * mean**2).sum() / power.sum())
 
 
 def cfc(values: FloatArray, rate: float, class_: float, standard: Standard = "J211") -> FloatArray:
