@@ -320,6 +320,7 @@ def test_diagnosis_of_6aw_reports_its_pairs(channel: str, group: set[str]) -> No
     assert group <= set(found.channels)
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     reason="search() passes over channels without which α is not told sample by sample, and accuses others"
 )
@@ -333,6 +334,7 @@ def test_channels_that_cannot_be_left_out_are_not_put_on_others(motion: str, cha
     assert channel in found.channels or not found.channels, found.reason
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     reason="the instant of a shift is looked for on a grid of 12: beside it the right shape costs too much"
 )
@@ -344,6 +346,7 @@ def test_a_large_shift_at_the_event_is_told(preset: str, fault: str) -> None:
     assert fault.split(":")[0] in found.channels, found.reason
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     reason="by_search() names the best kind of fault though it explains too little, and asks no rival for λ"
 )
