@@ -85,8 +85,8 @@ def fit(
 ) -> Fit:
     """Minimise the cost from ω `start` (n+1,3) until it settles to `tolerance`.
 
-    A fit that has not settled within `iterations`, or still costs more than `hopeless` after three, says so:
-    `converged`. EstimationError where ω is not determined.
+    A fit that has not settled within `iterations`, or after three costs more than `hopeless` and no longer halves its
+    cost, says so: `converged`. EstimationError where ω is not determined.
     """
     here = point(data, start, np.zeros(len(data.channel)) if theta is None else theta)
     for iteration in range(1, iterations + 1):
@@ -103,7 +103,8 @@ def fit(
         size = here.cost + data.dof
         gained, missed = abs(previous - here.cost), abs(previous - promised - here.cost)
         converged = gained <= tolerance.gain * size or missed <= tolerance.promise * size
-        if converged or stuck or (iteration >= 3 and here.cost > hopeless):
+        lost = iteration >= 3 and here.cost > max(hopeless, 0.5 * previous)
+        if converged or stuck or lost:
             break
     return Fit(data, here.omega, here.theta, here.cost, converged, iteration, log_determinant(solved.schur))
 
