@@ -215,7 +215,7 @@ def test_the_fit_has_the_same_information(preset: str, motion: str) -> None:
         if k is not None and preset == "coplanar-3" and names[k] in ("a0z", "a1z", "a2z"):
             continue  # without a normal channel the fit does not tell α: test_channels_that_cannot_be_left_out
         expected = separations(array, rates(motion), step, free=k)
-        seen = 1 / step_sds(found, onset, free=k) ** 2 / size
+        seen = 1 / step_sds(found, found.data.time[onset], free=k) ** 2 / size
         assert seen == pytest.approx(expected, rel=1e-5, abs=1e-8)
         if k is not None:
             tied[k] = seen < SEEN
@@ -226,7 +226,7 @@ def test_the_fit_has_the_same_information(preset: str, motion: str) -> None:
 @pytest.mark.parametrize("preset", ["3-2-1", "rgla", "compact-cube"])
 @pytest.mark.parametrize("motion", sorted(MOTIONS))
 def test_a_step_is_never_known_where_nothing_is_redundant(preset: str, motion: str) -> None:
-    assert np.isinf(step_sds(at(preset, motion), 6)).all()
+    assert np.isinf(step_sds(at(preset, motion), 6 * STEP)).all()
 
 
 @pytest.mark.parametrize("preset", ["naap-3222", "coplanar-3-gyro", "6aw", "naap-gyro"])
@@ -238,7 +238,7 @@ def test_uncertain_calibration_only_hides(preset: str, motion: str) -> None:
         narrow = np.zeros(len(array))
         for part in (0.0, 0.1, 1.0):
             data = replace(found.data, prior_sd=part * calibration.prior_sds(array))
-            wide = step_sds(trajectory.fit(data, found.omega), 6, free=k)
+            wide = step_sds(trajectory.fit(data, found.omega), 6 * STEP, free=k)
             assert (wide >= narrow * (1 - 1e-6)).all()
             narrow = wide
 
@@ -254,9 +254,9 @@ def misfit(preset: str, faulty: str, free: str, size: float) -> float:
     readings[:, j] += size * FAULTS["pulse"] * noise_of(array)[j]
     weight[:, array.index(free)] = 0.0
     start = found.omega
-    for part in (0.25, 0.5, 0.75, 1.0):  # followed from the linear limit
+    for part in (0.25, 0.5, 0.75, *[1.0] * 6):  # followed from the linear limit; every fit goes a step further
         between = found.data.readings + part * (readings - found.data.readings)
-        done = trajectory.fit(replace(found.data, readings=between, weight=weight), start, tolerance=1e-12)
+        done = trajectory.fit(replace(found.data, readings=between, weight=weight), start)
         start = done.omega
     return done.cost
 

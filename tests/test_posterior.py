@@ -79,7 +79,7 @@ def score(name: str, seed: int) -> Scores:
     still = np.zeros(SAMPLES + 1)
     still[0] = 1e6
     data = Data(array, time, y, np.broadcast_to(1 / sigma, y.shape).copy(), prior, still)
-    found = trajectory.fit(data, omega, tolerance=1e-9)
+    found = trajectory.fit(data, omega)
     assert found.converged
     stated = posterior(found)
     channel, parameter = data.active
