@@ -26,6 +26,7 @@ from nineaudit.physics import nap
 from nineaudit.reconstruct import Reconstruction, rebuild_channel
 from nineaudit.recording import Recording
 from nineaudit.rulebook import Rulebook, load_rulebook
+from nineaudit.undo import undo
 from nineaudit.waivers import Waiver
 
 
@@ -145,8 +146,12 @@ def _words(case: Case) -> dict[str, str]:
 
 
 def _repair(case: Case, diagnosis: Diagnosis) -> Reconstruction | None:
-    if diagnosis.status is not Status.ISOLATED or len(diagnosis.channels) != 1:
+    if diagnosis.status is not Status.ISOLATED:
         return None
+    best = next((c for c in diagnosis.candidates if set(c.channels) == set(diagnosis.channels)), None)
+    undone = None if best is None else _or(lambda: undo(case, best), lambda _: None)
+    if undone is not None or len(diagnosis.channels) != 1:
+        return undone
     return _or(lambda: mend(case, diagnosis.channels[0]), lambda _: None)
 
 

@@ -49,10 +49,14 @@ def repaired(
     done = json.loads(made.read_text(encoding="utf-8"))
     u = display(done["u_rms"], done["unit"], audit.recording.rig.units, 2)
     return [
-        f"{output}: {' and '.join(done['channels'])} rebuilt from the other channels, {done['samples_replaced']} of "
+        f"{output}: {' and '.join(done['channels'])} {_how(done)}, {done['samples_replaced']} of "
         f"{done['samples']} samples, standard uncertainty {u}",
         f"{made}: what was done, how well, from what, by whom",
     ]
+
+
+def _how(done: dict[str, Any]) -> str:
+    return f"repaired ({done['method']})" if done["undone"] else "rebuilt from the other channels"
 
 
 def simulated(

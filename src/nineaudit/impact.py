@@ -9,14 +9,20 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.case import Case
-from nineaudit.estimate import calibration
-from nineaudit.estimate.motion import Motion, bridge, estimate_motion
+from nineaudit.errors import EstimationError
+from nineaudit.estimate.condense import block_means
+from nineaudit.estimate.draws import draws
+from nineaudit.estimate.motion import Motion, bridge
+from nineaudit.estimate.samples import at_samples
+from nineaudit.estimate.trajectory import Fit
 from nineaudit.physics import injury, kinematics, rigid_body
 from nineaudit.reconstruct import Reconstruction
 from nineaudit.units import G0
 
 DRAWS, SEED = 64, 20090402
 """Monte Carlo draws (JCGM 101) for the uncertainties, 9 % of each of them, and their seed."""
+IN_THE_INSTRUMENT = ("cross_axis", "position")
+"""Faults that the fit has as calibration errors of the channel."""
 
 
 @dataclass(frozen=True)
@@ -67,33 +73,40 @@ def unit_of(name: str) -> str:
 
 
 def impact(case: Case, repair: Reconstruction) -> Mapping[str, Impact]:
-    """Reported values with the channels as measured and as repaired. EstimationError where there is no motion."""
-    fixed = case.readings.copy()
-    fixed[:, [case.array.index(c) for c in repair.channels]] = repair.repaired
-    start = None if case.rest is None else case.rest.start
+    """Reported values with all channels at their word, and after the repair: of the whole-record fit behind it, with a0
+    and α from each sample. EstimationError where there is no motion, or the repair has no fit.
+
+    `before` is what a laboratory would have computed from the recording as it is. u: root mean square of what motions
+    drawn from the posterior give (ω and θ by draws.py: noise, calibration, fault; and the noise of each block),
+    less what the fit itself gives; so that it holds the bias, too, by which noise raises the peak of a curve.
+    """
+    if repair.fit is None:
+        raise EstimationError("the repair has no whole-record fit")
+    readings, blocks = _as_fitted(case, repair), case.condensed
     before = reported(case, case.time, case.motion)
-    after = reported(case, case.time, estimate_motion(case.array, case.time, fixed, case.sigma, start))
-    u = _scatter(case, fixed, repair)
-    return {name: Impact(before[name], after[name], u[name], unit_of(name)) for name in after}
+    after = reported(case, case.time, _motion(repair.fit, case.time, readings, case.sigma))
+    means, rng = block_means(readings, blocks.length), np.random.default_rng(SEED)
+    itself = reported(case, blocks.time, _motion(repair.fit, blocks.time, means, blocks.sigma))
+    squares = dict.fromkeys(itself, 0.0)
+    for drawn in draws(repair.fit, DRAWS, rng):
+        noisy = means + blocks.sigma * rng.standard_normal(means.shape)
+        for name, value in reported(case, blocks.time, _motion(drawn, blocks.time, noisy, blocks.sigma)).items():
+            squares[name] += (value - itself[name]) ** 2 / DRAWS
+    return {name: Impact(before[name], after[name], squares[name] ** 0.5, unit_of(name)) for name in after}
 
 
-def _scatter(case: Case, fixed: FloatArray, repair: Reconstruction) -> dict[str, float]:
-    """Standard deviation of the reported values over draws of every calibration error, the noise, and the
-    rebuilt channel's uncertainty (one draw for its whole curve: it is calibration that dominates it)."""
-    rng = np.random.default_rng(SEED)
-    step = max(1, len(case.time) // 1000)
-    time, readings = case.time[::step], bridge(fixed, case.time)[::step]
-    start = None if case.rest is None else case.rest.start // step
-    motion = estimate_motion(case.array, time, readings, case.sigma, start)
-    patterns = calibration.all_columns(case.array, readings, time, motion)
-    for j, channel in enumerate(repair.channels):
-        i = case.array.index(channel)
-        patterns[i] = np.where(repair.replaced[::step, [j]], 0.0, patterns[i])
-        patterns[i, :, 0] += np.where(repair.replaced[::step, j], repair.u[::step, j], 0.0)
-    draws = []
-    for _ in range(DRAWS):
-        theta = rng.standard_normal((len(case.array), patterns.shape[2]))
-        drawn = readings + np.einsum("knp,kp->nk", patterns, theta)
-        drawn += case.sigma / np.sqrt(step) * rng.standard_normal(readings.shape)
-        draws.append(reported(case, time, estimate_motion(case.array, time, drawn, case.sigma, start)))
-    return {name: float(np.std([d[name] for d in draws], ddof=1)) for name in draws[0]}
+def _as_fitted(case: Case, repair: Reconstruction) -> FloatArray:
+    """(n,k) readings after the repair. A rebuilt sample tells nothing that its donors do not; a tilted or displaced
+    sensor is used as it was measured, its tilt and place being in the fit."""
+    readings = case.readings.copy()
+    columns = [case.array.index(c) for c in repair.channels]
+    if repair.fault is None:
+        readings[:, columns] = np.where(repair.replaced, np.nan, repair.measured)
+    elif repair.fault not in IN_THE_INSTRUMENT:
+        readings[:, columns] = repair.repaired
+    return readings
+
+
+def _motion(found: Fit, time: FloatArray, readings: FloatArray, sigma: FloatArray) -> Motion:
+    motion = at_samples(found, time, readings, sigma).motion
+    return Motion(motion.omega, bridge(motion.alpha, time), bridge(motion.a0, time), motion.method)

@@ -34,9 +34,10 @@ def repair(
     force: bool = False,
     now: datetime | None = None,
 ) -> Path:
-    """Write the recording with one channel rebuilt to `output`, and `output`.provenance.json; returns the latter.
+    """Write the recording with one channel (two that were swapped) repaired to `output`, and `output`.provenance.json;
+    returns the latter.
 
-    `channel` None: the one that the diagnosis isolated. ConfigurationError when nothing was isolated and no
+    `channel` None: what the diagnosis isolated. ConfigurationError when nothing was isolated and no
     channel is given (a group is never repaired on its own), or when a file is in the way and `force` is not set;
     EstimationError when the channel cannot be rebuilt; RecordingError when the original changed meanwhile.
     """
@@ -69,7 +70,7 @@ def repaired_readings(audit: Audit, rebuilt: Reconstruction) -> FloatArray:
     """(n,k) SI: the recording as it was read, with the replaced samples rebuilt and their zero put back."""
     out = audit.recording.readings.copy()
     columns = [audit.recording.rig.array.index(c) for c in rebuilt.channels]
-    values = rebuilt.rebuilt + audit.case.zero[columns]
+    values = rebuilt.rebuilt + (audit.case.zero[columns] if rebuilt.zeros is None else rebuilt.zeros)
     out[:, columns] = np.where(rebuilt.replaced, values, out[:, columns])
     return out
 
@@ -90,6 +91,7 @@ def provenance(
         "samples_replaced": int(rebuilt.replaced.sum()),
         "samples": int(rebuilt.replaced.shape[0]),
         "method": rebuilt.method,
+        "undone": _undone(rebuilt),
         "donors": list(rebuilt.donors),
         "u_rms": rebuilt.u_rms,
         "unit": "m/s^2" if rig.array[rebuilt.channels[0]].kind == "accelerometer" else "rad/s",
@@ -104,6 +106,13 @@ def provenance(
         "utc": now.astimezone(UTC).isoformat(timespec="seconds"),
         "tool": dict(audit.tool),
     }
+
+
+def _undone(rebuilt: Reconstruction) -> dict[str, Any] | None:
+    """The fault that was undone by its model, its parameters and their standard uncertainties (SI); None: rebuilt."""
+    if rebuilt.fault is None:
+        return None
+    return {"fault": rebuilt.fault, "parameters": dict(rebuilt.parameters), "u": dict(rebuilt.parameters_u)}
 
 
 def _reconstruction(audit: Audit, channel: str | None) -> Reconstruction:
@@ -121,7 +130,7 @@ def _reconstruction(audit: Audit, channel: str | None) -> Reconstruction:
         return mend(audit.case, channel)
     what = {
         Status.HEALTHY: "no channel is faulty: there is nothing to repair",
-        Status.ISOLATED: f"{group} are at fault together, and one channel can be rebuilt at a time",
+        Status.ISOLATED: f"{group} are at fault together; nothing undoes it, and one channel can be rebuilt at a time",
         Status.AMBIGUOUS: f"the culprit is one of {group}, and this recording cannot tell which",
     }.get(status, f"no channel was isolated: {audit.diagnosis.reason}")
     raise ConfigurationError(

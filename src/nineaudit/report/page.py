@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import math
 import os
 import tempfile
 from functools import cache
@@ -197,8 +198,9 @@ def rebuilt(audit: Audit) -> dict[str, Any] | None:
         ("Method", new.method),
         ("Rebuilt from", ", ".join(new.donors)),
         ("Standard uncertainty u (rms)", quantity(float(new.u_rms) / one, unit, 2)),
-        ("u against the Cramér–Rao bound", f"{digits(new.bound_ratio)} times"),
     ]
+    if math.isfinite(new.bound_ratio):
+        facts.append(("Its white-noise part against the Cramér–Rao bound", f"{digits(new.bound_ratio)} times"))
     return {"facts": facts, "figures": reconstruction_figures(audit)}
 
 
