@@ -15,7 +15,7 @@ from nineaudit.simulate import simulate
 FAULTS = {
     "naap-gyro": [
         "a1y:clipping=0.5", "a0x:gain=-20%", "a2z:zero_shift=10%", "a3x:delay=0.8ms", "a0y:polarity", "a1z:drift=10%",
-        "a3y:cross_axis=15%", "a0z:dropout=5ms", "a2x:wrong_filter=CFC60", "a1y:unit", "a3x:noise", "gx:gain=15%",
+        "a3y:cross_axis=15%", "a0z:dropout=5ms", "a2x:wrong_filter=CFC60", "a1y:unit", "a3x:noise", "gx:gain=25%",
     ],
     "triax-3": ["a1y:clipping=0.5", "a2z:zero_shift=10%", "a3x:noise", "a2x:unit"],
     "coplanar-3-gyro": ["a0x:gain=-20%", "a2z:zero_shift=10%", "a1z:unknown"],

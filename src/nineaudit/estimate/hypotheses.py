@@ -158,14 +158,20 @@ def any_waveform(data: Data, left: Fit, channel: int, reference: float) -> Hypot
     """
     free = _free(data, left, channel)
     if free.mean() > 0.9:
-        return Hypothesis(
-            (channel,), "unknown", log_evidence(left) - _price(data, left, channel) - reference, left.statistic
-        )
+        price = _price(data, left, channel)
+        return Hypothesis((channel,), "unknown", log_evidence(left) - price - reference, left.statistic)
     part = masked(data, channel, free)
     found = fit(part, left.omega, theta_for(part, left), LOOK, ROUGH)
     kept = 0.5 * float((~free & (data.weight[:, channel] > 0)).sum())
     price = _price(data, left, channel) - kept
     return Hypothesis((channel,), "unknown", log_evidence(found) - price - reference, found.statistic)
+
+
+def left_out(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis:
+    """The channel free throughout, each sample at its price."""
+    weight = data.weight[:, channel]
+    price = float((weight > 0).sum()) * (0.5 + _freedom(data, channel))
+    return Hypothesis((channel,), "unknown", log_evidence(left) - price - reference, left.statistic)
 
 
 def two_waveforms(data: Data, left: Fit, pair: tuple[int, int], reference: float) -> Hypothesis:
@@ -180,11 +186,15 @@ def _free(data: Data, left: Fit, channel: int) -> BoolArray:
 
 
 def _price(data: Data, left: Fit, channel: int) -> float:
-    """Nats of a channel that was left out: what a healthy sample is expected to cost, and for each free one the
-    logarithm of how much wider than the noise it may lie."""
+    """Nats of a channel that was left out: what a healthy sample is expected to cost, and each free one its freedom."""
+    healthy = 0.5 * float((data.weight[:, channel] > 0).sum())
+    return healthy + float(_free(data, left, channel).sum()) * _freedom(data, channel)
+
+
+def _freedom(data: Data, channel: int) -> float:
+    """Nats of one free sample: the logarithm of how much wider than the noise it may lie."""
     weight = data.weight[:, channel]
-    wide = max(float(np.abs(data.readings[:, channel]).max() * weight.max()), 10.0)
-    return 0.5 * float((weight > 0).sum()) + float(_free(data, left, channel).sum()) * float(np.log(wide))
+    return float(np.log(max(float(np.abs(data.readings[:, channel]).max() * weight.max()), 10.0)))
 
 
 def noisy(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis | None:

@@ -116,6 +116,12 @@ class Data:
         return np.where(short[which], (ANY_ALPHA * self.step) ** -2, 0.0)
 
     @cached_property
+    def sloped(self) -> BoolArray:
+        """(n,) samples at which the slope of a reading may be taken: α is told there and at both neighbours."""
+        bridged = np.concatenate([[False], self.bridge > 0, [False]])
+        return np.asarray(~(bridged[:-2] | bridged[1:-1] | bridged[2:]))
+
+    @cached_property
     def dof(self) -> int:
         """Expectation of the cost: valid readings less a0 (as far as it is sensed) and ω, save where ω is known or
         no sample beside a node has a valid reading."""

@@ -178,7 +178,7 @@ def _columns(data: Data, there: Instrument, features: FloatArray) -> FloatArray:
     out[zeros] = sd[zeros, None]
     if len(timed):
         slopes = kinematics.differentiate(there.predict(features).T, data.time).T
-        out[timed] = -sd[timed, None] * slopes[channel[timed]]
+        out[timed] = np.where(data.sloped, -sd[timed, None] * slopes[channel[timed]], 0.0)
     if data.extra is not None:
         out[count:] = data.extra.columns
     return out

@@ -58,6 +58,7 @@ def search(healthy: Fit, onset: int, wrong: BoolArray, limit: float) -> Search:
     close = _contenders(without, small, wrong)
     without |= {k: fit(f.data, f.omega, f.theta) for k in close if not (f := without[k]).converged}
     found = [x for k in close for x in _closely(data, healthy, without[k], k, onset, wrong[:, k], small, reference)]
+    found += [h.left_out(data, f, k, reference) for k, f in without.items() if k not in close]
     if not found or max(found, key=lambda x: x.evidence).statistic > min(limit, WHOLE):
         found += _of_two(healthy, without, close, min((x.statistic for x in found), default=np.inf), reference)
     return Search(healthy, tuple(sorted(found, key=lambda x: -x.evidence)), without)

@@ -23,8 +23,9 @@ ITERATIONS, SMALLEST_STEP, ROUNDING = 25, 1e-3, 1e-10
 
 
 class Tolerance(NamedTuple):
-    """A step is the last when it gains less than `gain` of the cost, or what the normal equations promised to
-    `promise` of it: the cost is then quadratic about here, and the next step would gain less than the difference."""
+    """A step is the last when the normal equations promise it less than `gain` of the cost, or when it gains what they
+    promised to `promise` of it: the cost is then quadratic about here, and the next would gain less than what is
+    missing. What it gained alone says nothing: a step cut short in a bent valley gains little far from the bottom."""
 
     gain: float
     promise: float
@@ -101,8 +102,8 @@ def fit(
             scale *= 0.25
         here, stuck = trial, trial.cost > previous * (1.0 + ROUNDING)
         size = here.cost + data.dof
-        gained, missed = abs(previous - here.cost), abs(previous - promised - here.cost)
-        converged = gained <= tolerance.gain * size or missed <= tolerance.promise * size
+        missed = abs(previous - promised - here.cost)
+        converged = promised <= tolerance.gain * size or missed <= tolerance.promise * size
         lost = iteration >= 3 and here.cost > max(hopeless, 0.5 * previous)
         if converged or stuck or lost:
             break
