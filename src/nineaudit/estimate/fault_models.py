@@ -73,10 +73,11 @@ def gain(f: Faulty) -> Undone:
     """Sensitivity, sign or unit."""
     there, seen, weight = f.left.ideal[:, f.column], f.data.readings[:, f.column], f.data.weight[:, f.column] ** 2
     factor = float((weight * there) @ seen) / max(float((weight * there) @ there), 1e-300)
+    near = f.left
     for _ in range(ROUNDS):
         if not 1e-4 < abs(factor) < 1e4:
             raise EstimationError("no gain can be told", found=factor)
-        found = fit(_scaled(f, factor, _noise_over(f, factor), GAIN_SD), f.left.omega)
+        near = found = _settled(_scaled(f, factor, _noise_over(f, factor), GAIN_SD), near, f.column, GAIN)
         place = _places(found.data, f.column, [GAIN])
         more = float(found.theta[place[0]]) * GAIN_SD
         factor *= 1.0 + more
@@ -102,13 +103,14 @@ def delay(f: Faulty) -> Undone:
     late = _best_lag(f, step) * step
     prior = f.data.prior_sd.copy()
     prior[f.column, TIMING] = TIMING_SD
+    near = f.left
     for _ in range(ROUNDS):
         values = advanced(f.trace, late / step)
-        found = fit(_with_trace(replace(f.data, prior_sd=prior), f, values), f.left.omega)
+        near = found = _settled(_with_trace(replace(f.data, prior_sd=prior), f, values), near, f.column, TIMING)
         place = _places(found.data, f.column, [TIMING])
         more = float(found.theta[place[0]]) * TIMING_SD
         late += more
-        if abs(more) < 1e-3 * step:
+        if abs(more) < 1e-2 * step:
             break
     u = TIMING_SD * float(_sd(found, place)[0])
     noise = np.full(len(f.time), f.sigma[f.column])
@@ -185,6 +187,13 @@ def advanced(values: FloatArray, late: float) -> FloatArray:
     source = np.clip(source, 0, len(values) - 1)
     near = np.convolve(~valid, np.ones(5), mode="same") > 0  # the kernel has all but a few per cent within two samples
     return np.where(inside & ~near[source], moved[source], np.nan)
+
+
+def _settled(data: Data, near: Fit, column: int, parameter: int) -> Fit:
+    """The fit from another one near by, with one parameter of the channel, which is in the readings already, at 0."""
+    theta = theta_for(data, near)
+    theta[_places(data, column, [parameter])] = 0.0
+    return fit(data, near.omega, theta)
 
 
 def _best_lag(f: Faulty, step: float) -> int:
