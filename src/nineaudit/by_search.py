@@ -113,16 +113,16 @@ def _candidates(case: Case, search: Search, evidence: Mapping[str, str]) -> tupl
     for channels in sorted(scores, key=lambda c: -scores[c]):
         best = next(x for x in search.found if x.channels == channels)
         names = tuple(case.array.channels[c] for c in channels)
-        word = evidence.get(names[0], "unknown") if best.word == "samples" else _word(best)
+        word = evidence.get(names[0], "unknown") if best.word == "samples" else fault_word(best.word, best.parameters)
         out.append(Candidate(names, word, weight[channels] / total, best.statistic, dict(best.parameters)))
     return tuple(out)
 
 
-def _word(x: Hypothesis) -> str:
+def fault_word(word: str, parameters: Mapping[str, float]) -> str:
     """The fault word of INTERFACE.md: a gain near −1 is a polarity, one near a ratio of units is a unit."""
-    if x.word != "gain":
-        return x.word
-    factor = x.parameters.get("factor", 1.0 + x.parameters.get("size", 0.0))
+    if word != "gain":
+        return word
+    factor = parameters.get("factor", 1.0 + parameters.get("size", 0.0))
     if abs(factor + 1.0) < 0.1:
         return "polarity"
     size = max(abs(factor), 1.0 / max(abs(factor), 1e-9))

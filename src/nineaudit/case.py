@@ -23,6 +23,8 @@ from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
 from nineaudit.estimate.search import Search, search
 from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
 from nineaudit.estimate.start import make_data
+from nineaudit.estimate.student import StudentFit, first_fit
+from nineaudit.estimate.suspects import Suspect, suspects
 from nineaudit.estimate.trajectory import Fit
 from nineaudit.physics import filters, nap
 from nineaudit.recording import Recording
@@ -207,6 +209,29 @@ class Case:
     def healthy(self) -> Fit:
         """The whole-record fit with every channel at its word. EstimationError where the motion cannot be told."""
         return healthy_fit(self.fit_data)
+
+    @cached_property
+    def student_data(self) -> Data:
+        """What a large array's fit sees: fit_data without the samples that their own trace shows to be wrong."""
+        weight = np.where(self.flagged_blocks, 0.0, self.fit_data.weight)
+        return replace(self.fit_data, weight=weight)
+
+    @cached_property
+    def student(self) -> StudentFit:
+        """The fit of student_data that bears knocks between coarse samples; needs rates on three axes."""
+        return first_fit(self.student_data)
+
+    @cached_property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """The channels of a large array with what their readings claim to be, best first."""
+        single = self.condensed.length == 1
+        raw_zero = np.equal(self.recording.readings if single else self.condensed.readings, 0.0)
+        return suspects(self.student_data, self.student, raw_zero)
+
+    @property
+    def student_limit(self) -> float:
+        """Largest cost per degree of freedom of a typical sample of `student`, for a healthy recording."""
+        return closed_form.limit_per_dof(max(self.student_data.dof, 1))
 
     @property
     def statistic(self) -> float:

@@ -3,7 +3,8 @@
 nine accelerometers in the ideal 3-2-2-2 layout     closed forms (by_closed_form.py), which are quick; what they
                                                     cannot settle goes to the search
 any other redundant array of up to 12 channels      whole-record search (by_search.py)
-larger arrays                                       parity, with and without what traces show wrong by themselves
+larger arrays with rate sensors on three axes       each channel against all others (by_others.py)
+larger arrays without                               parity, with and without what traces show wrong by themselves
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from nineaudit.by_closed_form import by_closed_form
+from nineaudit.by_others import by_others
 from nineaudit.by_search import by_search
 from nineaudit.case import Case
 from nineaudit.diagnosis import Candidate, Diagnosis, Status
 from nineaudit.estimate import parity
+from nineaudit.estimate.motion import has_rates
 from nineaudit.estimate.search import FEW_CHANNELS
 
 SETTLED = 1.15
@@ -39,6 +42,8 @@ def diagnose(case: Case, evidence: Mapping[str, str] | None = None) -> Diagnosis
         return quick if _settled(quick) else by_search(case, evidence or {}, quick)
     if len(case.array) <= FEW_CHANNELS:
         return by_search(case, evidence or {})
+    if has_rates(case.array):
+        return by_others(case, evidence or {})
     return _of_parity(case, evidence or {})
 
 

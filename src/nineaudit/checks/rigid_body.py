@@ -10,9 +10,12 @@ import numpy as np
 from nineaudit.case import Case
 from nineaudit.estimate import closed_form, parity
 from nineaudit.estimate.motion import has_rates, product_free
-from nineaudit.estimate.search import FEW_CHANNELS
+from nineaudit.estimate.quiet import noise_level
+from nineaudit.estimate.search import DETECTION_NATS, FEW_CHANNELS
 from nineaudit.finding import COVERAGE_FACTOR, Measure, NotApplicable
 
+COARSE = 5.0
+"""Second differences over the noise above which knocks pass between the samples: no single one proves a fault."""
 AXES = ("ωyωz", "ωzωx", "ωxωy")
 
 
@@ -46,6 +49,8 @@ def constraint_equations(case: Case, *, false_alarm: float) -> tuple[Measure, ..
 
 def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
     """RB302: every channel against the least-squares fit of the whole array, (I − HH⁺)(y − q(ω)) [METHODS 2]."""
+    if by_student(case) and _unresolved(case) > COARSE:
+        return NotApplicable(f"the samples do not resolve the motion ({_unresolved(case):.0f} times the noise); RB303")
     if sum(parity.redundancy(case.array)) == 0:
         return NotApplicable(_nothing_to_spare(case))
     if not (has_rates(case.array) or product_free(case.array)):
@@ -63,7 +68,7 @@ def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
     )
 
 
-def whole_record(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
+def whole_record(case: Case, *, false_alarm: float) -> Measure | tuple[Measure, ...] | NotApplicable:
     """RB303: cost per degree of freedom of the whole record, calibration errors fitted within their priors [METHODS 2].
 
     Small faults that no single sample shows add up here. Of the constraints for nine accelerometers in the 3-2-2-2
@@ -71,11 +76,34 @@ def whole_record(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
     """
     if sum(parity.redundancy(case.array)) == 0:
         return NotApplicable(_nothing_to_spare(case))
+    if by_student(case):
+        limit = closed_form.limit_per_dof(case.student_data.dof, false_alarm)
+        return _by_student(case, limit)
     if len(case.array) > FEW_CHANNELS:
-        return NotApplicable(f"more than {FEW_CHANNELS} channels; RB302 tests their parity")
+        return NotApplicable(f"more than {FEW_CHANNELS} channels without rates on three axes; RB302 tests their parity")
     dof = case.nap_healthy.dof if case.closed_forms_apply else case.fit_data.dof
     limit = closed_form.limit_per_dof(dof, false_alarm)
     return Measure(case.statistic, limit, "1", detail="cost per degree of freedom")
+
+
+def _by_student(case: Case, limit: float) -> tuple[Measure, ...]:
+    """A typical sample of a large array, and the channel of which a fault explains most."""
+    found = [Measure(case.student.statistic, limit, "1", detail="cost per degree of freedom of a typical sample")]
+    if case.suspects:
+        nats = max(case.suspects[0].claim.evidence, 0.0)
+        found.append(Measure(nats, DETECTION_NATS, "1", detail="evidence in nats of a fault in one channel"))
+    return tuple(found)
+
+
+def by_student(case: Case) -> bool:
+    """Whether the array is large and has rates on three axes: a fit bears knocks between coarse samples."""
+    return len(case.array) > FEW_CHANNELS and has_rates(case.array)
+
+
+def _unresolved(case: Case) -> float:
+    """What neighbouring samples leave of each other, over the noise: near 1 where they resolve the motion."""
+    blocks = case.condensed
+    return float(np.median(noise_level(blocks.readings, None) / blocks.sigma))
 
 
 def _nothing_to_spare(case: Case) -> str:

@@ -1,0 +1,74 @@
+"""The channels of a large array left out one by one, and what their readings claim to be.
+
+Evidence is the logarithm of how much better a fault explains a channel than its stated calibration errors do, all other
+channels taken at their word. In exact Gaussian theory the evidence of no fault is the same whichever channel is left
+out, so that the claims of different channels compare.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from nineaudit.array import BoolArray
+from nineaudit.estimate.claims import Claim, claims, taken_for
+from nineaudit.estimate.hypotheses import masked
+from nineaudit.estimate.model import Data
+from nineaudit.estimate.prediction import predict
+from nineaudit.estimate.search import DETECTION_NATS
+from nineaudit.estimate.student import StudentFit, refit
+
+FEW_CHANNELS = 24
+"""Up to so many channels a fault bends the fit so far that a first look, with the channel still in it, says little:
+each channel is left out in turn."""
+SUSPECTS, PARTNERS = 4, 4
+"""Channels left out of a larger array; channels among which a swap is looked for."""
+WORTH_NATS = 4.0
+"""Evidence at the first look below which a channel of a larger array is not left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """`channels` (columns) with the claim that explains them best, and the fit without them."""
+
+    channels: tuple[int, ...]
+    claim: Claim
+    without: StudentFit
+
+
+def suspects(data: Data, whole: StudentFit, raw_zero: BoolArray) -> tuple[Suspect, ...]:
+    """Channels and pairs that may be swapped, with their best claims, best first. `raw_zero` (n,k) where an instrument
+    put out exactly 0."""
+    used = np.flatnonzero(data.used).tolist()
+    if len(used) > FEW_CHANNELS:
+        looks = {k: _best(data, k, whole, raw_zero).evidence for k in used}
+        used = [k for k in sorted(looks, key=lambda k: -looks[k])[:SUSPECTS] if looks[k] > WORTH_NATS]
+    found = []
+    for k in used:
+        without = refit(masked(data, k), whole)
+        found.append(Suspect((k,), _best(data, k, without, raw_zero), without))
+    found.sort(key=lambda x: -x.claim.evidence)
+    if found and found[0].claim.word == "unknown" and found[0].claim.evidence >= DETECTION_NATS:
+        found += _swaps(data, found, whole)
+    return tuple(sorted(found, key=lambda x: -x.claim.evidence))
+
+
+def _best(data: Data, channel: int, fitted: StudentFit, raw_zero: BoolArray) -> Claim:
+    p = predict(data, channel, fitted)
+    return claims(p, raw_zero[p.rows, channel])[0]
+
+
+def _swaps(data: Data, found: Sequence[Suspect], whole: StudentFit) -> list[Suspect]:
+    """Two channels taken for each other, among those that look wrong most."""
+    kind, among = data.array.is_accelerometer, [x.channels[0] for x in found[:PARTNERS]]
+    out = []
+    for i, j in combinations(among, 2):
+        if kind[i] == kind[j]:
+            without = refit(masked(masked(data, i), j), whole)
+            a, b = predict(data, i, without), predict(data, j, without)
+            total = taken_for(a, b.whole) + taken_for(b, a.whole)
+            out.append(Suspect((i, j), Claim("swap", total), without))
+    return out
