@@ -8,17 +8,16 @@ out, so that the claims of different channels compare.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from nineaudit.array import BoolArray
 from nineaudit.estimate.claims import Claim, claims, taken_for
-from nineaudit.estimate.hypotheses import masked
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.prediction import predict
-from nineaudit.estimate.search import DETECTION_NATS
+from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.estimate.student import StudentFit, refit
 
 FEW_CHANNELS = 24
@@ -48,12 +47,18 @@ def suspects(data: Data, whole: StudentFit, raw_zero: BoolArray) -> tuple[Suspec
         used = [k for k in sorted(looks, key=lambda k: -looks[k])[:SUSPECTS] if looks[k] > WORTH_NATS]
     found = []
     for k in used:
-        without = refit(masked(data, k), whole)
+        without = refit(_without(data, k), whole)
         found.append(Suspect((k,), _best(data, k, without, raw_zero), without))
     found.sort(key=lambda x: -x.claim.evidence)
     if found and found[0].claim.word == "unknown" and found[0].claim.evidence >= DETECTION_NATS:
         found += _swaps(data, found, whole)
     return tuple(sorted(found, key=lambda x: -x.claim.evidence))
+
+
+def _without(data: Data, *channels: int) -> Data:
+    weight = data.weight.copy()
+    weight[:, list(channels)] = 0.0
+    return replace(data, weight=weight)
 
 
 def _best(data: Data, channel: int, fitted: StudentFit, raw_zero: BoolArray) -> Claim:
@@ -67,7 +72,7 @@ def _swaps(data: Data, found: Sequence[Suspect], whole: StudentFit) -> list[Susp
     out = []
     for i, j in combinations(among, 2):
         if kind[i] == kind[j]:
-            without = refit(masked(masked(data, i), j), whole)
+            without = refit(_without(data, i, j), whole)
             a, b = predict(data, i, without), predict(data, j, without)
             total = taken_for(a, b.whole) + taken_for(b, a.whole)
             out.append(Suspect((i, j), Claim("swap", total), without))
