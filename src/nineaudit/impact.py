@@ -90,7 +90,8 @@ def impact(case: Case, repair: Reconstruction) -> Mapping[str, Impact]:
     squares = dict.fromkeys(itself, 0.0)
     for drawn in draws(repair.fit, DRAWS, rng):
         noisy = means + blocks.sigma * rng.standard_normal(means.shape)
-        for name, value in reported(case, blocks.time, _motion(drawn, blocks.time, noisy, blocks.sigma)).items():
+        motion = _motion(drawn, blocks.time, noisy, blocks.sigma, repair.fit)
+        for name, value in reported(case, blocks.time, motion).items():
             squares[name] += (value - itself[name]) ** 2 / DRAWS
     return {name: Impact(before[name], after[name], squares[name] ** 0.5, unit_of(name)) for name in after}
 
@@ -107,6 +108,6 @@ def _as_fitted(case: Case, repair: Reconstruction) -> FloatArray:
     return readings
 
 
-def _motion(found: Fit, time: FloatArray, readings: FloatArray, sigma: FloatArray) -> Motion:
-    motion = at_samples(found, time, readings, sigma).motion
+def _motion(found: Fit, time: FloatArray, readings: FloatArray, sigma: FloatArray, near: Fit | None = None) -> Motion:
+    motion = at_samples(found, time, readings, sigma, near).motion
     return Motion(motion.omega, bridge(motion.alpha, time), bridge(motion.a0, time), motion.method)

@@ -60,14 +60,19 @@ class Samples:
     own: BoolArray
 
 
-def at_samples(fit: Fit, time: FloatArray, readings: FloatArray, sigma: FloatArray) -> Samples:
+def at_samples(fit: Fit, time: FloatArray, readings: FloatArray, sigma: FloatArray, near: Fit | None = None) -> Samples:
     """The motion from `readings` (n,k) SI zeroed (NaN: not used) at `time` (n,), noise `sigma` (k,), ω and θ of `fit`.
 
-    a0 and α are NaN where a sample's valid readings do not tell them.
+    a0 and α are NaN where a sample's valid readings do not tell them. `near`: another fit whose slopes will do.
     """
-    there, data = fit.point.instrument, fit.data
+    data = fit.data
+    there = data.bent(fit.theta)
     omega, slope = _omega(fit, time)
-    left = readings - _offsets(fit, time) - rigid_body.centripetal(there.positions, there.axes, omega)
+    left = (
+        readings
+        - _offsets(fit, time, fit if near is None else near)
+        - rigid_body.centripetal(there.positions, there.axes, omega)
+    )
     valid = np.isfinite(left) & there.held
     patterns, which = _patterns(valid)
     solver, own = np.zeros((len(patterns), 6, len(data.array))), np.zeros(len(patterns), dtype=np.bool_)
@@ -105,7 +110,7 @@ def rebuild(at: Samples, posterior: Posterior, sigma: FloatArray, column: int) -
 def bound(fit: Fit, sigma: FloatArray, column: int) -> float:
     """Least standard deviation of an accelerometer rebuilt from the other accelerometers, ω and calibration known:
     √(h_k (Σ h'h'ᵀ/σ²)⁻¹ h_kᵀ), σ√(h/(1−h)) where all are alike (METHODS.md 4). ∞ where they do not determine it."""
-    there, sensor = fit.point.instrument, fit.data.array.sensors[column]
+    there, sensor = fit.data.bent(fit.theta), fit.data.array.sensors[column]
     held = [i for i in np.flatnonzero(there.held & fit.data.used).tolist() if i != column]
     design = np.hstack([there.axes_a, there.lever])[held]
     if np.linalg.matrix_rank(design, tol=1e-6) < 6:
@@ -147,13 +152,13 @@ def _omega(fit: Fit, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(curve(time)), np.asarray(curve(time, 1))
 
 
-def _offsets(fit: Fit, time: FloatArray) -> FloatArray:
-    """(n,k) what zeros and time skews add: b − s dy/dt, y of a perfect instrument."""
+def _offsets(fit: Fit, time: FloatArray, near: Fit) -> FloatArray:
+    """(n,k) what zeros and time skews add: b − s dy/dt, y of a perfect instrument in the motion of `near`."""
     error = fit.data.errors(fit.theta)
     out = np.broadcast_to(error[:, 1], (len(time), len(error))).copy()
     late = np.flatnonzero(error[:, 7])
     if len(late):
-        slopes = kinematics.differentiate(fit.ideal[:, late], fit.data.time)
+        slopes = kinematics.differentiate(near.ideal[:, late], fit.data.time)
         for i, k in enumerate(late):
             out[:, k] -= error[k, 7] * np.interp(time, fit.data.time, slopes[:, i])
     return out
