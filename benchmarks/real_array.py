@@ -218,13 +218,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             chosen = part if imus == 8 else only(part, SUBSET)
             results += examine_window(chosen, number, imus, options.channels, options.seed)
             print(f"window {number}, {imus} IMUs: {len(results)} diagnoses", file=sys.stderr)
+            if options.json:
+                options.json.write_text("".join(json.dumps(r.__dict__) + "\n" for r in results), encoding="utf-8")
     print(table(results))
     for r in results:
         if r.fault == UNTOUCHED or r.outcome in (Outcome.WRONG, Outcome.OTHER):
             cost = "" if r.statistic is None else f", {r.statistic:.3g} per degree of freedom"
             print(f"- window {r.window}, {r.imus} IMUs, {r.fault} {' '.join(r.culprits)}: {r.said}{cost}")
-    if options.json:
-        options.json.write_text("".join(json.dumps(r.__dict__) + "\n" for r in results), encoding="utf-8")
 
 
 if __name__ == "__main__":

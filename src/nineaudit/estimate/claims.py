@@ -81,13 +81,14 @@ def _scaled(p: Prediction, left: FloatArray) -> Claim:
 
     ŷ has errors of its own, and a regression that takes it as exact finds gains too small. With errors in both the
     variance of y − c ŷ is σ² + c² u², and its logarithm does not count [Fuller, Measurement Error Models, 1987, 1.3].
-    u is an upper bound (between_samples.py) and would find them too large: the claim must stand both ways. `left` (m,)
-    of the healthy channel scales s to the noise as found.
+    u is an upper bound (between_samples.py) and would find them too large: the claim must stand both ways. What is
+    `left` (m,) of the healthy channel, or of that with the median ratio if it is less, scales s to the noise as found.
     """
     near = np.abs(p.expected) > STANDS_OUT * p.s
     about = float(np.median(p.y[near] / p.expected[near])) if near.sum() > 10 else 1.0
     about = about if abs(about) > 1e-3 else 1.0
-    noise = max(float(np.median(np.abs(left))) / MEDIAN_STUDENT, 1e-3)
+    scaled = (p.y - about * p.expected) / np.hypot(p.sigma, about * p.u)
+    noise = max(min(float(np.median(np.abs(x))) for x in (left, scaled)) / MEDIAN_STUDENT, 1e-3)
     found = []
     for u in (0.0 * p.u, min(noise, 1.0) * p.u) if p.u.any() else (p.u,):
         factor, explained = _best_factor(p, about, COARSE_GAIN * abs(about), noise, u)
