@@ -18,6 +18,7 @@ from nineaudit.array import BoolArray, FloatArray
 from nineaudit.case import Case
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import condense, samples
+from nineaudit.estimate.fault_models import PATIENCE
 from nineaudit.estimate.hypotheses import masked
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.point import point
@@ -147,7 +148,7 @@ def left_out(case: Case, data: Data, column: int) -> Fit:
     errors: list[EstimationError] = []
     for start in starts:
         try:
-            found.append(fit(alone, start()))
+            found.append(fit(alone, start(), iterations=PATIENCE))
         except EstimationError as error:
             errors.append(error)
             continue

@@ -26,7 +26,7 @@ from nineaudit.case import Case
 from nineaudit.diagnosis import Candidate
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import fault_models
-from nineaudit.estimate.fault_models import Faulty, Undone
+from nineaudit.estimate.fault_models import PATIENCE, Faulty, Undone
 from nineaudit.estimate.posterior import posterior
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import Fit, fit
@@ -146,7 +146,7 @@ def _swap(case: Case, columns: list[int]) -> Reconstruction | None:
     prior[:, ZERO] = prior[order, ZERO]
     back = replace(data, readings=data.readings[:, order], weight=data.weight[:, order], prior_sd=prior)
     start = first_omega(replace(plain, readings=plain.readings[:, order], weight=plain.weight[:, order]))
-    found = fit(back, start)
+    found = fit(back, start, iterations=PATIENCE)
     if not found.converged or statistic(case, found) > case.statistic_limit:
         return None
     none, theta = np.zeros(0, dtype=np.intp), posterior(found).theta

@@ -30,7 +30,8 @@ GAIN_SD, TIMING_SD, TILT_SD, PLACE_SD = 0.1, 2e-4, 0.1, 10e-3
 """Priors of the parameters, far wider than the record leaves them."""
 LONGEST_DELAY = 5e-3
 """s, of either sign, that is looked for."""
-ROUNDS = 8
+ROUNDS, PATIENCE = 8, 100
+"""Times that the readings are put right; iterations of a fit, which may creep along what the record hardly tells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +91,7 @@ def gain(f: Faulty) -> Undone:
 
 def sign(f: Faulty) -> Undone:
     """Reversed, and nothing else: the gain keeps the rig's word."""
-    found = fit(_scaled(f, -1.0, 1.0, None), f.left.omega)
+    found = fit(_scaled(f, -1.0, 1.0, None), f.left.omega, iterations=PATIENCE)
     noise = np.full(len(f.time), f.sigma[f.column])
     return Undone(-f.trace, noise, found, np.zeros(0, dtype=np.intp), {"factor": -1.0}, {"factor": 0.0})
 
@@ -153,7 +154,7 @@ def _of_instrument(f: Faulty, which: slice, sd: float) -> Undone:
     prior = f.data.prior_sd.copy()
     prior[f.column, which] = sd
     data = replace(f.data, prior_sd=prior)
-    found = fit(data, f.left.omega, theta_for(data, f.left))
+    found = fit(data, f.left.omega, theta_for(data, f.left), PATIENCE)
     place = _places(data, f.column, range(8)[which])
     error = found.data.errors(found.theta)[f.column]
     others = f.readings.copy()
@@ -193,7 +194,7 @@ def _settled(data: Data, near: Fit, column: int, parameter: int) -> Fit:
     """The fit from another one near by, with one parameter of the channel, which is in the readings already, at 0."""
     theta = theta_for(data, near)
     theta[_places(data, column, [parameter])] = 0.0
-    return fit(data, near.omega, theta)
+    return fit(data, near.omega, theta, PATIENCE)
 
 
 def _best_lag(f: Faulty, step: float) -> int:
@@ -232,7 +233,7 @@ def _beside(f: Faulty, shape: FloatArray) -> tuple[Fit, IntArray, float]:
     scale = 3.0 * float(np.abs(f.data.readings[:, f.column] - f.left.ideal[:, f.column]).max())
     extra = Extra(scale * condense.block_means(shape, f.length)[None], np.array([f.column]))
     data = replace(f.data, extra=extra)
-    found = fit(data, f.left.omega, theta_for(data, f.left))
+    found = fit(data, f.left.omega, theta_for(data, f.left), PATIENCE)
     return found, np.array([len(found.theta) - 1]), scale
 
 
