@@ -29,8 +29,8 @@ the calibration errors in its columns."""
 DELAYS = (-2, -1, 1, 2, 3)
 """Whole samples that are tried."""
 STANDS_OUT = 5.0
-MEDIAN_STUDENT = 0.741
-"""Median of |t| with four degrees of freedom."""
+SAME, MEDIAN_STUDENT = 1e-9, 0.741
+"""Readings nearer than this are one; median of |t| with four degrees of freedom."""
 
 
 @dataclass(frozen=True)
@@ -132,21 +132,27 @@ def _delayed(p: Prediction) -> Iterator[Claim]:
 
 
 def _clipped(p: Prediction) -> Iterator[Claim]:
-    """Held at its own largest reading where the others expect more."""
+    """Held at its own largest reading where the others expect more. Every further reading that is exactly the same has
+    the density of one step of the readings, and was there at even odds."""
     level = float(np.abs(p.y).max())
-    if (np.abs(p.expected) > level).any():
-        found, _ = evidence(p, np.clip(p.expected, -level, level), p.columns)
-        yield Claim("clipping", found - _place(p), {"level": level})
+    if not (np.abs(p.expected) > level).any():
+        return
+    held = np.flatnonzero(np.abs(p.y) == level)
+    kept = p.only(np.setdiff1d(np.arange(len(p.y)), held[1:]))
+    found, _ = evidence(kept, np.clip(kept.expected, -level, level), kept.columns)
+    step = _resolution(p)
+    if len(held) == 1 or step > 0.0:
+        exact = (len(held) - 1) * (float(np.log(2.0 * step)) if step > 0.0 else 0.0)
+        yield Claim("clipping", found - exact - _place(p), {"level": level})
 
 
 def _dropped(p: Prediction, left: FloatArray, raw_zero: BoolArray) -> Iterator[Claim]:
     """Exactly zero where the others expect something else: there the density is one over the step of the readings, and
     each such sample costs its place."""
-    steps = np.diff(np.unique(p.y))
-    steps = steps[steps > 1e-9]
-    if not raw_zero.any() or not len(steps):
+    step = _resolution(p)
+    if not raw_zero.any() or step <= 0.0:
         return
-    price = float(np.log(steps.min())) + _place(p)
+    price = float(np.log(step)) + _place(p)
     out = raw_zero & (-price > log_student(left) - np.log(p.s))
     if out.any() and not out.all():
         kept = p.only(np.flatnonzero(~out))
@@ -158,6 +164,13 @@ def _anything(p: Prediction) -> Claim:
     """A waveform of its own, as large as the channel reads."""
     size = max(float(np.sqrt(np.mean(p.y**2))), 1e-9)
     return Claim("unknown", float((log_student(p.y / size) - np.log(size)).sum()))
+
+
+def _resolution(p: Prediction) -> float:
+    """Smallest step between the readings; 0 where all are the same."""
+    steps = np.diff(np.unique(p.y))
+    steps = steps[steps > SAME]
+    return float(steps.min()) if len(steps) else 0.0
 
 
 def _place(p: Prediction) -> float:

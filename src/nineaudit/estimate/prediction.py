@@ -19,7 +19,7 @@ from nineaudit.estimate.between_samples import coarse
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.normal import by_nodes, normal_equations
 from nineaudit.estimate.shared import SharedElimination
-from nineaudit.estimate.student import StudentFit
+from nineaudit.estimate.student import FREEDOM, SPENT, StudentFit
 from nineaudit.physics import kinematics
 
 
@@ -65,11 +65,18 @@ def predict(data: Data, channel: int, without: StudentFit) -> Prediction:
 
 
 def _knock(without: StudentFit, channel: int) -> FloatArray:
-    """(n,) factor on σ that the others of its kind felt."""
-    held = without.data.array.is_accelerometer
+    """(n,) factor on σ that the others of its kind felt: λ² = (ν + χ²)/(ν + m) without the channel's own share."""
+    data, held = without.data, without.data.array.is_accelerometer
     kind = held == held[channel]
-    kind[channel] = False
-    return np.asarray(without.knock[:, kind].max(axis=1))
+    others = kind & (np.arange(len(kind)) != channel)
+    shared = np.asarray(without.knock[:, others].max(axis=1))
+    if not (data.weight[:, channel] > 0).any():
+        return shared
+    left = (data.readings - without.at.correction - without.at.ideal)[:, channel]
+    own = np.square(data.weight[:, channel] * without.knock[:, channel] * left)
+    spare = np.maximum((data.weight[:, kind] > 0).sum(axis=1) - SPENT[0 if held[channel] else 1], 1)
+    whole = shared**2 * (FREEDOM + spare)
+    return np.asarray(np.sqrt(np.maximum(whole - own, FREEDOM) / (FREEDOM + spare - 1)))
 
 
 def _variance(without: StudentFit, channel: int) -> FloatArray:
