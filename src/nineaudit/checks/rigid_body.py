@@ -50,7 +50,8 @@ def constraint_equations(case: Case, *, false_alarm: float) -> tuple[Measure, ..
 def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
     """RB302: every channel against the least-squares fit of the whole array, (I − HH⁺)(y − q(ω)) [METHODS 2]."""
     if by_student(case) and _unresolved(case) > COARSE:
-        return NotApplicable(f"the samples do not resolve the motion ({_unresolved(case):.0f} times the noise); RB303")
+        left = f"{_unresolved(case):.0f} times the noise is left between neighbours"
+        return NotApplicable(f"the samples do not resolve the motion ({left}); RB303 tests the whole record")
     if sum(parity.redundancy(case.array)) == 0:
         return NotApplicable(_nothing_to_spare(case))
     if not (has_rates(case.array) or product_free(case.array)):
