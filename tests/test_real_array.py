@@ -63,6 +63,7 @@ def test_the_rails_of_the_rate_sensors_are_named_and_nothing_else(script: Module
     assert set(found.channels) == railed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["zero shift 5 m/s²", "polarity", "delay of one sample", "swap"])
 def test_a_fault_in_eight_imus_is_named(script: ModuleType, shared_data: Path, fault: str) -> None:
     recording, culprits = script.faulty(part(script, shared_data, 8), fault, "imu5_ay")
@@ -71,6 +72,7 @@ def test_a_fault_in_eight_imus_is_named(script: ModuleType, shared_data: Path, f
     assert set(found.channels) == set(culprits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["zero shift 5 m/s²", "polarity"])
 def test_a_fault_in_three_imus_is_named(script: ModuleType, shared_data: Path, fault: str) -> None:
     recording, culprits = script.faulty(part(script, shared_data, 3), fault, "imu1_ax")
