@@ -18,8 +18,8 @@ from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.diagnose import Diagnosis, Status, diagnose
 from nineaudit.estimate import calibration, trajectory
-from nineaudit.estimate.hypotheses import step_sds
 from nineaudit.estimate.model import Data
+from nineaudit.estimate.separation import step_sds
 from nineaudit.physics import rigid_body
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.simulate import simulate
@@ -306,12 +306,9 @@ def test_diagnosis_of_a_naap_reports_the_groups(motion: str, channel: str) -> No
         assert set(found.channels) == twins
 
 
-# --- laws that do not hold yet: each is to pass, and then these marks must go (xfail is strict) --------------------
+# --- groups that a search can miss ---------------------------------------------------------------------------------
 
 
-@pytest.mark.xfail(
-    reason="diagnose() counts parity rows of one sample only; dω/dt = α, which ties 6aω together, is not one"
-)
 @pytest.mark.parametrize(("channel", "group"), [("a0z", {"a0z", "a2z"}), ("a3x", {"a0x", "a3x"})])
 def test_diagnosis_of_6aw_reports_its_pairs(channel: str, group: set[str]) -> None:
     """The last row of METHODS.md 3 that has groups: pairs that no motion separates, and yet a fault is seen."""
@@ -321,9 +318,6 @@ def test_diagnosis_of_6aw_reports_its_pairs(channel: str, group: set[str]) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="search() passes over channels without which α is not told sample by sample, and accuses others"
-)
 @pytest.mark.parametrize(
     ("motion", "channel"), [("rest", "a0z"), ("planar-z", "a1z"), ("planar-x", "a2z"), ("planar-x", "a1z")]
 )
@@ -335,9 +329,6 @@ def test_channels_that_cannot_be_left_out_are_not_put_on_others(motion: str, cha
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="the instant of a shift is looked for on a grid of 12: beside it the right shape costs too much"
-)
 @pytest.mark.parametrize(
     ("preset", "fault"), [("coplanar-3-gyro", "gy:zero_shift=3"), ("triax-3", "a1y:zero_shift=30")]
 )
@@ -347,9 +338,6 @@ def test_a_large_shift_at_the_event_is_told(preset: str, fault: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="by_search() names the best kind of fault though it explains too little, and asks no rival for λ"
-)
 def test_a_kind_of_fault_does_not_name_a_channel_whose_rival_explains_as_much() -> None:
     """A smooth error of 1 rad/s in gy, far under its smallest isolable size: to name the twin alone is worse than the
     group (METHODS.md 3)."""

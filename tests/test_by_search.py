@@ -8,7 +8,8 @@ import pytest
 from nineaudit.auditing import audit
 from nineaudit.case import Case
 from nineaudit.diagnose import Status, diagnose
-from nineaudit.estimate import hypotheses, search
+from nineaudit.estimate import hypotheses
+from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.simulate import simulate
 
@@ -84,7 +85,7 @@ def test_evidence_of_no_fault_is_the_reference():
     case = Case(simulate(parse_rig(preset_text("naap-gyro")), "drop", seed=4).recording)
     reference = hypotheses.log_evidence(case.healthy)
     small = hypotheses.small_faults(case.healthy, case.onset, reference)
-    assert max(x.evidence for x in small) < search.DETECTION_NATS
+    assert max(x.evidence for x in small) < DETECTION_NATS
     assert {x.channels[0] for x in small} == set(range(12))
 
 

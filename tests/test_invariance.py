@@ -199,7 +199,6 @@ def test_the_clock_may_start_anywhere(case: str) -> None:
     same(answer(case), diagnosed(later), shift=late)
 
 
-@pytest.mark.xfail(reason="10 times the class is asked of the rate to the last bit: case.py and filters.py, both <")
 @pytest.mark.parametrize("case", ["closed forms", "search, healthy"])
 def test_last_bits_of_the_rate_do_not_matter(case: str) -> None:
     """A clock of 10 kHz that is read from its stamps has 9999.999999999996 Hz, no slower than class 1000 needs."""

@@ -17,7 +17,7 @@ import numpy as np
 from nineaudit.by_search import LARGEST_GROUP, ODDS_NATS, fault_word
 from nineaudit.case import Case
 from nineaudit.diagnosis import Candidate, Diagnosis, Status
-from nineaudit.estimate.search import DETECTION_NATS
+from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.estimate.student import StudentFit
 from nineaudit.estimate.suspects import Suspect
 

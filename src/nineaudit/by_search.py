@@ -14,9 +14,10 @@ import numpy as np
 
 from nineaudit.case import Case
 from nineaudit.diagnosis import SEPARATION, Candidate, Diagnosis, Status
-from nineaudit.estimate.hypotheses import Hypothesis
-from nineaudit.estimate.search import DETECTION_NATS, FAR, Search, smallest
-from nineaudit.estimate.trajectory import Fit
+from nineaudit.estimate.hypotheses import Hypothesis, theta_for
+from nineaudit.estimate.model import Data
+from nineaudit.estimate.search import FAR, Search
+from nineaudit.estimate.separation import DETECTION_NATS, claimed, smallest
 
 ODDS_NATS = float(np.log(99.0))
 """A name needs 99 to 1 against every other channel."""
@@ -24,24 +25,24 @@ LARGEST_GROUP = 4
 """A group of more channels than this helps nobody."""
 UNEXPLAINED = 1.5
 """Cost per degree of freedom, over the best, that even the best hypothesis may leave before it explains nothing."""
+UNSAID = 0.01
+"""Part of the cost that what no budget says may move from one hypothesis to another: it must not name a twin."""
 WAVEFORMS = ("unknown", "samples")
+DEAD = 0.1
+"""Gain factor under which a channel measures nothing of the motion."""
 UNIT_FACTORS = (9.80665, 57.29578, 1000.0, 100.0, 25.4, 2.54, 0.3048 * 9.80665)
 
 
-def by_search(case: Case, evidence: Mapping[str, str], quick: Diagnosis | None = None) -> Diagnosis:
+def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
     """Diagnosis of a redundant array. EstimationError where no motion can be fitted.
 
     `evidence`: channel -> fault word that its own trace shows, the word of a hypothesis that leaves just those samples
-    out. `quick`: an answer of the closed forms that did not settle the matter; its (larger) sizes are kept.
+    out.
     """
     search = case.search
     best = search.found[0] if search.found else None
     base = Diagnosis(Status.HEALTHY, (), (), "", healthy_statistic=search.healthy.statistic, limit=case.statistic_limit)
-    if quick is None:
-        base = _with_sizes(case, search, base)
-    else:
-        sizes = quick.smallest_detectable, quick.smallest_isolable
-        base = replace(base, smallest_detectable=sizes[0], smallest_isolable=sizes[1])
+    base = _with_sizes(case, search, base)
     if best is None or best.evidence < DETECTION_NATS:
         return _nothing_found(search, base)
     candidates = _candidates(case, search, evidence)
@@ -93,14 +94,31 @@ def _group(search: Search, best: Hypothesis, floor: float) -> list[tuple[int, ..
     """The best channel, and every other that nothing sets apart from it."""
     scores = _scores(search)
     near = [c for c, score in scores.items() if scores[best.channels] - score < ODDS_NATS]
-    if best.word in WAVEFORMS and len(best.channels) == 1:
-        mine = search.without[best.channels[0]]
-        for k, f in search.without.items():
-            apart = (f.cost - f.data.dof - mine.cost + mine.data.dof) / floor
-            # a fit that has not settled may still fall: it is no evidence against its channel unless far off
-            if apart < (SEPARATION if f.converged else FAR) and (k,) not in near:
-                near.append((k,))
+    if len(best.channels) == 1 and best.channels[0] in search.without and _is_waveform(search, best):
+        channel, data = best.channels[0], search.healthy.data
+        mine, needed = search.without[channel], _separation(data)
+        rivals = {k: f for k, f in search.without.items() if k != channel and (k,) not in near}
+        # a fit that has not settled may still fall: it is no evidence against its channel unless far off
+        apart = {k: (f.cost - f.data.dof - mine.cost + mine.data.dof) / floor for k, f in rivals.items()}
+        tied = [k for k, f in rivals.items() if apart[k] < (needed if f.converged else FAR)]
+        seen = claimed(data, mine, channel, [k for k in rivals if k not in tied and apart[k] < FAR])
+        near += [(k,) for k in [*tied, *(k for k, told in seen.items() if told < needed)]]
     return sorted(near, key=lambda c: -scores.get(c, -np.inf))
+
+
+def _is_waveform(search: Search, best: Hypothesis) -> bool:
+    """Whether a hypothesis says no more than that its channel has another waveform: it is free, it is dead (a gain near
+    0), or its kind of fault leaves more than the free waveform does, by more than chance (3 σ of χ²)."""
+    if best.word in WAVEFORMS or abs(best.parameters.get("factor", 1.0)) < DEAD:
+        return True
+    dof, free = search.healthy.data.dof, search.without[best.channels[0]]
+    count = int((search.healthy.data.weight[:, best.channels[0]] > 0).sum())
+    return (best.statistic - 1.0) * dof - (free.cost - free.data.dof) > 3.0 * float(np.sqrt(2.0 * count))
+
+
+def _separation(data: Data) -> float:
+    """λ that sets two free waveforms apart, in a record whose budget leaves a little unsaid."""
+    return SEPARATION + UNSAID * data.dof
 
 
 def _candidates(case: Case, search: Search, evidence: Mapping[str, str]) -> tuple[Candidate, ...]:
@@ -131,10 +149,11 @@ def fault_word(word: str, parameters: Mapping[str, float]) -> str:
 
 def _with_sizes(case: Case, search: Search, base: Diagnosis) -> Diagnosis:
     """What would have shown and been pinned, about the fit without the best channel, in a record as noisy as this."""
-    at: Fit = search.healthy
+    at = whole = search.healthy
     if search.found and search.found[0].evidence > DETECTION_NATS:
-        at = search.without.get(search.found[0].channels[0], at)
-    detectable, isolable = smallest(at, case.onset, SEPARATION)
+        at = search.without.get(search.found[0].channels[0], whole)
+    at = replace(at, data=whole.data, theta=theta_for(whole.data, at))
+    detectable, isolable = smallest(at, case.onset, _separation(whole.data))
     names = case.array.channels
     return replace(
         base,

@@ -168,7 +168,7 @@ class Case:
         length = condense.block_length(len(self.time), self.recording.rate, pass_band, slowest)
         rest = None if self.rest is None else self.readings[self.rest.samples]
         rate = self.recording.rate
-        slow = cfc is None or rate < filters.SAMPLES_PER_CLASS * cfc
+        slow = cfc is None or not filters.fast_enough(rate, cfc)
         filtered = None if cfc is None or slow else filters.mean_noise(cfc, rate, length)
         return condense.Condensed(
             condense.block_means(self.time, length),
@@ -197,8 +197,7 @@ class Case:
     @property
     def statistic_limit(self) -> float:
         """Largest cost per degree of freedom of the whole-record fit of a healthy recording."""
-        dof = self.nap_healthy.dof if self.closed_forms_apply else self.fit_data.dof
-        return closed_form.limit_per_dof(max(dof, 1))
+        return closed_form.limit_per_dof(max(self.fit_data.dof, 1))
 
     @cached_property
     def search(self) -> Search:
@@ -235,18 +234,9 @@ class Case:
 
     @property
     def statistic(self) -> float:
-        """Cost per degree of freedom of the record with every channel at its word: by the closed forms for nine
-        accelerometers in the 3-2-2-2 layout, else of the whole-record fit. EstimationError where neither can tell.
-
-        The closed forms are linear in the calibration errors, which over seconds of integration is not enough: a cost
-        somewhat above its limit is looked at again by the whole-record fit.
-        """
-        if not self.closed_forms_apply:
-            return self.healthy.statistic
-        quick = self.nap_healthy.statistic
-        if not 1.0 < quick / self.statistic_limit < DOUBTFUL or not self.healthy.converged:
-            return quick
-        return min(quick, self.healthy.statistic)
+        """Cost per degree of freedom of the record with every channel at its word. EstimationError where the motion
+        cannot be told."""
+        return self.healthy.statistic
 
     @property
     def closed_forms_apply(self) -> bool:

@@ -1,8 +1,6 @@
 """Which channel? The right method for the array, and its answer (METHODS.md 3).
 
-nine accelerometers in the ideal 3-2-2-2 layout     closed forms (by_closed_form.py), which are quick; what they
-                                                    cannot settle goes to the search
-any other redundant array of up to 12 channels      whole-record search (by_search.py)
+any redundant array of up to 12 channels            whole-record search (by_search.py)
 larger arrays with rate sensors on three axes       each channel against all others (by_others.py)
 larger arrays without                               parity, with and without what traces show wrong by themselves
 """
@@ -12,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from nineaudit.by_closed_form import by_closed_form
 from nineaudit.by_others import by_others
 from nineaudit.by_search import by_search
 from nineaudit.case import Case
@@ -20,9 +17,6 @@ from nineaudit.diagnosis import Candidate, Diagnosis, Status
 from nineaudit.estimate import parity
 from nineaudit.estimate.motion import has_rates
 from nineaudit.estimate.search import FEW_CHANNELS
-
-SETTLED = 1.15
-"""Cost per degree of freedom up to which a record counts as whole without its culprit, noise being known to 10 %."""
 
 __all__ = ["Candidate", "Diagnosis", "Status", "diagnose"]
 
@@ -32,44 +26,14 @@ def diagnose(case: Case, evidence: Mapping[str, str] | None = None) -> Diagnosis
 
     `evidence`: channel -> fault word that its own trace shows (clipping, dropout, stuck, spikes).
     """
-    if sum(parity.redundancy(case.array)) == 0:
+    if not parity.redundant(case.array):
         reason = "the array has no redundancy: rigid-body constraints cannot show a fault in any channel"
         return Diagnosis(Status.UNDIAGNOSED, (), (), reason)
-    if case.closed_forms_apply:
-        quick = by_closed_form(case, evidence or {})
-        if quick.status is not Status.HEALTHY and case.statistic <= case.statistic_limit:
-            return _healthy_after_all(case, quick)
-        return quick if _settled(quick) else by_search(case, evidence or {}, quick)
     if len(case.array) <= FEW_CHANNELS:
         return by_search(case, evidence or {})
     if has_rates(case.array):
         return by_others(case, evidence or {})
     return _of_parity(case, evidence or {})
-
-
-def _healthy_after_all(case: Case, quick: Diagnosis) -> Diagnosis:
-    """The closed forms are linear in the calibration errors; the whole-record fit finds the record whole."""
-    cost = f"{case.statistic:.2f} per degree of freedom, limit {case.statistic_limit:.2f}"
-    return replace(
-        quick,
-        status=Status.HEALTHY,
-        channels=(),
-        candidates=(),
-        reason=f"the record is that of one rigid body within the budget: {cost}",
-        healthy_statistic=case.statistic,
-        limit=case.statistic_limit,
-        interval=None,
-    )
-
-
-def _settled(quick: Diagnosis) -> bool:
-    """Whether the closed forms' answer stands: healthy, or a culprit or group without which the record is whole.
-
-    They know no fault of two channels.
-    """
-    if quick.status in (Status.HEALTHY, Status.UNDIAGNOSED):
-        return quick.status is Status.HEALTHY
-    return quick.candidates[0].statistic <= SETTLED
 
 
 def _of_parity(case: Case, evidence: Mapping[str, str]) -> Diagnosis:

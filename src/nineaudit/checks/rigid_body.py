@@ -11,7 +11,8 @@ from nineaudit.case import Case
 from nineaudit.estimate import closed_form, parity
 from nineaudit.estimate.motion import has_rates, product_free
 from nineaudit.estimate.quiet import noise_level
-from nineaudit.estimate.search import DETECTION_NATS, FEW_CHANNELS
+from nineaudit.estimate.search import FEW_CHANNELS
+from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.finding import COVERAGE_FACTOR, Measure, NotApplicable
 
 COARSE = 5.0
@@ -72,18 +73,16 @@ def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
 def whole_record(case: Case, *, false_alarm: float) -> Measure | tuple[Measure, ...] | NotApplicable:
     """RB303: cost per degree of freedom of the whole record, calibration errors fitted within their priors [METHODS 2].
 
-    Small faults that no single sample shows add up here. Of the constraints for nine accelerometers in the 3-2-2-2
-    layout, of the whole-record fit for any other array.
+    Small faults that no single sample shows add up here.
     """
-    if sum(parity.redundancy(case.array)) == 0:
+    if not parity.redundant(case.array):
         return NotApplicable(_nothing_to_spare(case))
     if by_student(case):
         limit = closed_form.limit_per_dof(case.student_data.dof, false_alarm)
         return _by_student(case, limit)
     if len(case.array) > FEW_CHANNELS:
         return NotApplicable(f"more than {FEW_CHANNELS} channels without rates on three axes; RB302 tests their parity")
-    dof = case.nap_healthy.dof if case.closed_forms_apply else case.fit_data.dof
-    limit = closed_form.limit_per_dof(dof, false_alarm)
+    limit = closed_form.limit_per_dof(case.fit_data.dof, false_alarm)
     return Measure(case.statistic, limit, "1", detail="cost per degree of freedom")
 
 

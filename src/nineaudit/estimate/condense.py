@@ -28,6 +28,8 @@ class Condensed:
 SLOWEST_BLOCKS, WITH_RATES = 1000.0, 1500.0
 """Blocks a second that a head impact needs: products of ω must not change within a block; and where rate sensors show ω
 itself, so that the middle of a block must be the mean of its ends."""
+CLOCK = 1e-6
+"""Part of a rate that the rounding of its clock may take."""
 ENOUGH_BLOCKS = 8
 """Fewest blocks of rest from which the noise of a block is measured (pooled over the channels)."""
 KNOWN_FILTER, UNKNOWN_FILTER = 0.1, 0.5
@@ -47,7 +49,7 @@ def block_length(
     """
     coloured = rate / (2.5 * pass_band) if pass_band else 1.0
     bounded = min(-(-samples // most), rate / slowest)
-    return max(1, round(coloured), int(bounded))
+    return max(1, round(coloured), int(bounded * (1.0 + CLOCK)))
 
 
 def block_means(values: FloatArray, length: int) -> FloatArray:

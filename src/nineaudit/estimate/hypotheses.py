@@ -5,8 +5,7 @@
 Small faults: about the healthy fit, the columns of every kind of fault of every channel are put beside the calibration
 errors at once; one factorisation gives the Schur complement from which each kind takes its own rows and columns.
 Large faults bend the healthy fit. So each channel is also left out (free waveform) and put back about that fit with the
-shapes that do not know the signal; with its gain set free; and, where its own trace shows samples to be wrong, without
-those samples.
+shapes that do not know the signal, and in the ways of refitted.py.
 """
 
 from __future__ import annotations
@@ -17,10 +16,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray, IntArray
+from nineaudit.errors import EstimationError
 from nineaudit.estimate.model import Data, Extra
 from nineaudit.estimate.normal import Solved, eliminate, normal_equations
 from nineaudit.estimate.point import point
-from nineaudit.estimate.shapes import GAIN_SD, Shape, additive, any_curve, following
+from nineaudit.estimate.shapes import Shape, additive, any_curve, following
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import ROUGH, Fit, fit, log_determinant
 
@@ -29,8 +29,6 @@ HOPELESS = 10.0
 relative, and a record that costs so much is not that of a healthy instrument."""
 LOOK = 8
 """Iterations of a fit that is only compared."""
-STRETCH_NATS = 8.0
-"""What one stretch of wrong samples costs: its place and its length, out of some thousands."""
 
 
 @dataclass(frozen=True)
@@ -67,14 +65,22 @@ def masked(data: Data, channel: int, samples: BoolArray | None = None) -> Data:
 
 
 def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) -> Fit:
-    """The fit without one channel, from the better of two starts. EstimationError where the others do not tell ω."""
+    """The fit without one channel, from the best of some starts. EstimationError where the others do not tell ω."""
     alone = masked(data, channel)
     starts = [healthy.omega]
     if data.array.is_accelerometer[channel]:
-        starts.append(first_omega(alone))
+        starts += _starts_without(alone, healthy)
     theta = np.zeros(len(alone.channel))
     costs = [point(alone, w, theta).cost for w in starts] if len(starts) > 1 else [0.0]
-    return fit(alone, starts[int(np.argmin(costs))], iterations=LOOK, tolerance=ROUGH, hopeless=hopeless)
+    return fit(alone, starts[int(np.argmin(costs))], tolerance=ROUGH, hopeless=hopeless)
+
+
+def _starts_without(alone: Data, healthy: Fit) -> list[FloatArray]:
+    """ω from the other channels at their word; where they leave a direction of α untold, from rest and near it."""
+    try:
+        return [first_omega(alone)]
+    except EstimationError:
+        return [np.zeros_like(healthy.omega), 0.1 * healthy.omega]
 
 
 def confirm(data: Data, near: Fit, claim: Hypothesis, reference: float) -> Hypothesis:
@@ -104,176 +110,9 @@ def small_faults(healthy: Fit, onset: int, reference: float) -> list[Hypothesis]
 def curves(data: Data, left: Fit, channel: int, onset: int, reference: float) -> list[Hypothesis]:
     """Shapes that do not know the signal in one channel, about the fit `left` that did not use it."""
     peak = float(np.abs(left.ideal[:, channel]).max())
-    shapes = [*additive(data, channel, peak, onset), any_curve(data, channel, peak, onset)]
+    off = np.where(data.weight[:, channel] > 0, data.readings[:, channel] - left.ideal[:, channel], 0.0)
+    shapes = [*additive(data, channel, peak, onset, off=off), any_curve(data, channel, peak, onset)]
     return _compare(data, left.omega, theta_for(data, left), [(channel, s) for s in shapes], reference)
-
-
-def scaled(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis | None:
-    """The channel with another gain, y = (1 + g) ŷ: polarity, wrong unit, wrong sensitivity; None where ŷ is lost in
-    noise. g from the regression on ŷ without the channel, the readings divided by it (and their weight multiplied), and
-    the rest left to a fit with a prior of a tenth; repeated until it settles.
-    """
-    truth, weight = left.ideal[:, channel], data.weight[:, channel]
-    noise = 4.0 * float((weight > 0).sum())  # twice the noise of a reading, squared, in units of it
-    signal = float(((weight * truth) ** 2).sum())
-    if signal < 10.0 * noise:
-        return None
-    factor = float((weight**2 * truth) @ data.readings[:, channel]) / float((weight**2 * truth) @ truth)
-    prior = data.prior_sd.copy()
-    prior[channel, 0] = 0.1
-    omega = left.omega
-    for _ in range(3):
-        if abs(factor) < 1e-3:
-            return None
-        readings, weights = data.readings.copy(), data.weight.copy()
-        readings[:, channel] /= factor
-        weights[:, channel] *= abs(factor)
-        found = fit(replace(data, readings=readings, weight=weights, prior_sd=prior), omega, None, LOOK, ROUGH)
-        place = np.flatnonzero((found.data.active[0] == channel) & (found.data.active[1] == 0))
-        more = float(found.theta[place[0]]) * 0.1
-        omega, factor = found.omega, factor * (1.0 + more)
-        if abs(more) < 0.01:
-            break
-    occam = 0.5 * ((factor - 1.0) / GAIN_SD) ** 2 if abs(factor) < 3 else 10.0
-    evidence = log_evidence(found) - reference - min(occam, 10.0) - float(np.log(GAIN_SD / 0.1))
-    return Hypothesis((channel,), "gain", evidence, found.statistic, {"factor": factor})
-
-
-def without_samples(data: Data, left: Fit, channel: int, wrong: BoolArray, reference: float) -> Hypothesis:
-    """The channel without the samples that its own trace shows to be wrong, and as measured elsewhere.
-
-    A flat top or a dropout is predicted by its level: those samples cost what healthy ones are expected to.
-    """
-    part = masked(data, channel, wrong)
-    found = fit(part, left.omega, theta_for(part, left), LOOK, ROUGH)
-    stretches = int((np.diff(wrong.astype(int), prepend=0) == 1).sum())
-    evidence = log_evidence(found) - 0.5 * float(wrong.sum()) - reference - STRETCH_NATS * stretches
-    return Hypothesis((channel,), "samples", evidence, found.statistic)
-
-
-def any_waveform(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis:
-    """The channel free wherever it leaves what the others predict (by six times its noise), measured elsewhere.
-
-    A free sample costs the logarithm of how much wider than the noise it may lie.
-    """
-    free = _free(data, left, channel)
-    if free.mean() > 0.9:
-        price = _price(data, left, channel)
-        return Hypothesis((channel,), "unknown", log_evidence(left) - price - reference, left.statistic)
-    part = masked(data, channel, free)
-    found = fit(part, left.omega, theta_for(part, left), LOOK, ROUGH)
-    kept = 0.5 * float((~free & (data.weight[:, channel] > 0)).sum())
-    price = _price(data, left, channel) - kept
-    return Hypothesis((channel,), "unknown", log_evidence(found) - price - reference, found.statistic)
-
-
-def left_out(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis:
-    """The channel free throughout, each sample at its price."""
-    weight = data.weight[:, channel]
-    price = float((weight > 0).sum()) * (0.5 + _freedom(data, channel))
-    return Hypothesis((channel,), "unknown", log_evidence(left) - price - reference, left.statistic)
-
-
-def two_waveforms(data: Data, left: Fit, pair: tuple[int, int], reference: float) -> Hypothesis:
-    """Two channels free, `left` the fit without both."""
-    price = sum(_price(data, left, channel) for channel in pair)
-    return Hypothesis(pair, "unknown", log_evidence(left) - price - reference, left.statistic)
-
-
-def _free(data: Data, left: Fit, channel: int) -> BoolArray:
-    off = data.weight[:, channel] * np.abs(data.readings[:, channel] - left.ideal[:, channel])
-    return np.asarray(off > 6.0)
-
-
-def _price(data: Data, left: Fit, channel: int) -> float:
-    """Nats of a channel that was left out: what a healthy sample is expected to cost, and each free one its freedom."""
-    healthy = 0.5 * float((data.weight[:, channel] > 0).sum())
-    return healthy + float(_free(data, left, channel).sum()) * _freedom(data, channel)
-
-
-def _freedom(data: Data, channel: int) -> float:
-    """Nats of one free sample: the logarithm of how much wider than the noise it may lie."""
-    weight = data.weight[:, channel]
-    return float(np.log(max(float(np.abs(data.readings[:, channel]).max() * weight.max()), 10.0)))
-
-
-def noisy(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis | None:
-    """The channel with more noise than stated, the factor from what it leaves of the others' prediction; None where
-    that does not change sign from sample to sample like noise."""
-    weight = data.weight[:, channel]
-    off = (weight * (data.readings[:, channel] - left.ideal[:, channel]))[weight > 0]
-    levels, changes = (float(np.median(x**2)) / 0.455 for x in (off, np.diff(off) / np.sqrt(2.0)))
-    factor = float(np.sqrt(max(min(levels, 2.0 * changes) - 1.6, 0.0)))
-    if factor < 1.5:
-        return None
-    weights = data.weight.copy()
-    weights[:, channel] /= factor
-    part = replace(data, weight=weights)
-    found = fit(part, left.omega, theta_for(part, left), LOOK, ROUGH)
-    price = float((weight > 0).sum()) * float(np.log(factor))
-    return Hypothesis((channel,), "noise", log_evidence(found) - price - reference, found.statistic, {"factor": factor})
-
-
-def swapped(data: Data, pair: tuple[int, int], reference: float, hopeless: float) -> Hypothesis:
-    """Two channels taken for each other: the readings, with their weights, change places."""
-    order = np.arange(len(data.array))
-    order[list(pair)] = order[list(pair[::-1])]
-    changed = replace(data, readings=data.readings[:, order], weight=data.weight[:, order])
-    found = fit(changed, first_omega(changed), None, LOOK, ROUGH, hopeless)
-    return Hypothesis(pair, "swap", log_evidence(found) - reference, found.statistic)
-
-
-def swap_costs(healthy: Fit, pairs: Sequence[tuple[int, int]], most: int) -> list[tuple[float, tuple[int, int]]]:
-    """Cost per degree of freedom of each swap after two steps without calibration over `most` samples, best first."""
-    data = coarser(healthy, most).data
-    certain, out = replace(data, prior_sd=np.zeros_like(data.prior_sd)), []
-    for pair in pairs:
-        order = np.arange(len(data.array))
-        order[list(pair)] = order[list(pair[::-1])]
-        changed = replace(certain, readings=data.readings[:, order], weight=data.weight[:, order])
-        out.append((fit(changed, first_omega(changed), iterations=2).statistic, pair))
-    return sorted(out)
-
-
-def coarser(at: Fit, most: int) -> Fit:
-    """The fit at every so many nodes, with means of the readings between them, at most about `most`: what the record
-    tells of slow faults is the same."""
-    data, length = at.data, -(-len(at.data.time) // most)
-    if length == 1:
-        return at
-    whole = len(data.time) // length
-    squares, readings, time = (
-        values[: whole * length].reshape(whole, length, *values.shape[1:])
-        for values in (data.weight**2, data.readings, data.time)
-    )
-    total = squares.sum(axis=1)
-    mean = (squares * readings).sum(axis=1) / np.where(total > 0, total, 1.0)
-    still = data.still[: whole * length + 1 : length]
-    part = replace(data, time=time.mean(axis=1), readings=mean, weight=np.sqrt(total), still=still, extra=None)
-    return replace(at, data=part, omega=at.omega[: whole * length + 1 : length], theta=theta_for(part, at))
-
-
-def step_sds(at: Fit, onset: float, free: int | None = None) -> FloatArray:
-    """(k,) standard deviation (SI) with which a step at the `onset` (s) in each channel would be known, beside
-    everything else; `free`: with that channel's waveform free (infinite for itself). ∞ where it could not be told at
-    all."""
-    data = at.data if free is None else masked(at.data, free)
-    count = len(data.array)
-    step = (data.time >= onset).astype(float)
-    whole = replace(data, extra=Extra(np.repeat(step[None], count, axis=0), np.arange(count)))
-    theta = theta_for(whole, at)
-    solved = eliminate(normal_equations(point(whole, at.omega, theta)))
-    base = len(theta) - count
-    out = np.full(count, np.inf)
-    for k in range(count):
-        # the prior 1 of a shape in the normal equations is taken off: the step is wholly unknown
-        rows = np.r_[np.arange(base), base + k]
-        schur = solved.schur[np.ix_(rows, rows)]
-        schur[-1, -1] -= 1.0
-        left = schur[-1, -1] - schur[-1, :-1] @ np.linalg.solve(schur[:-1, :-1], schur[:-1, -1])
-        if left > 1e-9 * max(solved.normal.dense[base + k, base + k], 1e-300):
-            out[k] = 1.0 / np.sqrt(left)
-    return out
 
 
 def theta_for(data: Data, other: Fit) -> FloatArray:

@@ -23,7 +23,7 @@ from nineaudit.array import BoolArray, FloatArray, IntArray, SensorArray
 from nineaudit.estimate import calibration
 from nineaudit.estimate.instrument import Instrument, instrument
 
-ANY_ALPHA = 1e5
+ANY_ALPHA = 1e6
 """rad/s²: where the valid channels do not tell α, it is 0 with this standard deviation, far beyond any impact."""
 
 
@@ -107,12 +107,14 @@ class Data:
     @cached_property
     def bridge(self) -> FloatArray:
         """(n,) precision (s²/rad²) with which ω stays over a sample whose valid channels do not tell α, though those of
-        the record do; where they never do, over one without any valid channel."""
+        the record do, in five directions at least (of the sixth, products of ω may tell); where they never do, over one
+        without any valid channel."""
         patterns, which = self._valid
         as_stated = self.bent(np.zeros(len(self.channel)))
         design = np.hstack([as_stated.axes_a, as_stated.lever])
-        rank = [int(np.linalg.matrix_rank(design[p])) if p.any() else 0 for p in (*patterns, patterns.any(axis=0))]
-        short = np.array([r < 6 if rank[-1] == 6 else not p.any() for r, p in zip(rank[:-1], patterns, strict=True)])
+        every = int(np.linalg.matrix_rank(design[self.used])) if self.used.any() else 0
+        rank = [int(np.linalg.matrix_rank(design[p])) if p.any() else 0 for p in patterns]
+        short = np.array([r < 6 if every >= 5 else not p.any() for r, p in zip(rank, patterns, strict=True)])
         return np.where(short[which], (ANY_ALPHA * self.step) ** -2, 0.0)
 
     @cached_property

@@ -19,9 +19,12 @@ from itertools import pairwise
 import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
+from nineaudit.errors import EstimationError
 from nineaudit.estimate import block_tridiagonal
 from nineaudit.estimate.point import Point
 
+_ROUNDING = 1e-10
+"""Part of the information on ω that is rounding where a0 takes all of it."""
 STRETCH = 256
 """Nodes at a time: border and factor of a stretch stay in the processor's cache."""
 
@@ -107,10 +110,14 @@ def _of_omega(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Blocks (n+1,3,3), (n,3,3) of ω and its gradient (n+1,3), with rest and the bridges over gaps."""
     data, n, one = at.data, len(at.data.time), np.eye(3)
-    diagonal, gradient = np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3))
+    diagonal, gradient, whole = np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1)
     for j, pj, nodes in zip(sides, projected, (slice(0, n), slice(1, n + 1)), strict=True):
+        whole[nodes] += np.einsum("kan,kan->n", j, j)
         diagonal[nodes] += np.einsum("kan,kbn->nab", j, pj)
         gradient[nodes] += np.einsum("kan,kn->na", pj, at.z)
+    lost = (np.trace(diagonal, axis1=1, axis2=2) <= _ROUNDING * whole) & (data.still == 0)
+    if (lost & ~np.append(data.bridge > 0, True) & ~np.append(True, data.bridge > 0)).any():
+        raise EstimationError("the trajectory is not determined by the readings: a0 explains all of them")
     upper = np.einsum("kan,kbn->nab", sides[0], projected[1]) - data.bridge[:, None, None] * one
     diagonal += data.still[:, None, None] * one
     gradient -= data.still[:, None] * at.omega

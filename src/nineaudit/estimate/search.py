@@ -8,11 +8,13 @@ from itertools import combinations
 
 import numpy as np
 
-from nineaudit.array import BoolArray, FloatArray
+from nineaudit.array import BoolArray
 from nineaudit.estimate import hypotheses as h
+from nineaudit.estimate import refitted
 from nineaudit.estimate.hypotheses import Hypothesis
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import has_rates
+from nineaudit.estimate.separation import ENOUGH
 from nineaudit.estimate.trajectory import Fit, fit
 from nineaudit.physics import rigid_body
 
@@ -20,8 +22,6 @@ FEW_CHANNELS = 12
 """Up to so many channels every one is left out in turn; of larger arrays the most suspect ones."""
 SUSPECTS, CONTENDERS, CONFIRMED = 6, 3, 2
 """Channels left out of a larger array; channels looked at closely; shapes of each fitted on their own."""
-DETECTION_NATS = 12.0
-"""Evidence over no fault before anything is said: prior odds of 1000 for a healthy record, and 160 to 1 beyond."""
 WHOLE = 1.1
 """Cost per degree of freedom above which faults of two channels are tried, whatever the limit is."""
 FAR, HOPELESS = 300.0, 2.0
@@ -29,8 +29,6 @@ FAR, HOPELESS = 300.0, 2.0
 which a fit without a channel is given up."""
 CLOSE_NATS = 20.0
 """Linear evidence under the best shape's at which another needs no fit of its own."""
-ENOUGH = 800
-"""Samples that tell as much of a step as any more."""
 WORTH_NATS = 4.0
 """Linear evidence below which no small fault needs a closer look."""
 
@@ -58,7 +56,7 @@ def search(healthy: Fit, onset: int, wrong: BoolArray, limit: float) -> Search:
     close = _contenders(without, small, wrong)
     without |= {k: fit(f.data, f.omega, f.theta) for k in close if not (f := without[k]).converged}
     found = [x for k in close for x in _closely(data, healthy, without[k], k, onset, wrong[:, k], small, reference)]
-    found += [h.left_out(data, f, k, reference) for k, f in without.items() if k not in close]
+    found += [refitted.left_out(data, f, k, reference) for k, f in without.items() if k not in close]
     if not found or max(found, key=lambda x: x.evidence).statistic > min(limit, WHOLE):
         found += _of_two(healthy, without, close, min((x.statistic for x in found), default=np.inf), reference)
     return Search(healthy, tuple(sorted(found, key=lambda x: -x.evidence)), without)
@@ -93,13 +91,14 @@ def _leave_out(data: Data, healthy: Fit, suspects: Sequence[int], small: Sequenc
 
 
 def _determined_without(data: Data, *channels: int) -> bool:
-    """Whether the other channels still determine the motion: rank 6 of the accelerometers, or rates on three axes."""
+    """Whether the other channels still determine the motion: the accelerometers, but for one direction of α that
+    products of ω may tell (coplanar triaxes), or rates on three axes."""
     kept = [k for k in np.flatnonzero((data.weight > 0).any(axis=0)).tolist() if k not in channels]
     array = data.array.select(kept)
     held = array.is_accelerometer
     design = rigid_body.design(array.positions[held], array.axes[held])
     rank = int(np.linalg.matrix_rank(design, tol=1e-6)) if held.any() else 0
-    return rank == 6 or (has_rates(array) and int(held.sum()) >= 3)
+    return rank >= 5 or (has_rates(array) and int(held.sum()) >= 3)
 
 
 def _contenders(without: dict[int, Fit], small: Sequence[Hypothesis], wrong: BoolArray) -> list[int]:
@@ -133,13 +132,13 @@ def _closely(
     shapes.sort(key=lambda pair: -pair[0].evidence)
     likely = [pair for pair in shapes[:CONFIRMED] if pair[0].evidence > shapes[0][0].evidence - CLOSE_NATS]
     found = [h.confirm(data, near, x, reference) for x, near in likely]
-    found.append(h.any_waveform(data, left, channel, reference))
+    found.append(refitted.any_waveform(data, left, channel, reference))
     # where a small gain mends the record, a large one is the same
     mended = found[0].word == "gain" and found[0].statistic <= WHOLE
-    tried = (None if mended else h.scaled(data, left, channel, reference), h.noisy(data, left, channel, reference))
-    found += [x for x in tried if x is not None]
+    gain = None if mended else refitted.scaled(data, left, channel, reference)
+    found += [x for x in (gain, refitted.noisy(data, left, channel, reference)) if x is not None]
     if wrong.any():
-        found.append(h.without_samples(data, left, channel, wrong, reference))
+        found.append(refitted.without_samples(data, left, channel, wrong, reference))
     return found
 
 
@@ -152,24 +151,12 @@ def _of_two(
     among = list(without) if len(without) <= FEW_CHANNELS else list(close)
     pairs = [(i, j) for i, j in combinations(among, 2) if kinds[i] == kinds[j]]
     hopeless = HOPELESS * best * data.dof
-    found = [h.swapped(data, pair, reference, hopeless) for _, pair in h.swap_costs(healthy, pairs, ENOUGH)[:2]]
+    likely = refitted.swap_costs(healthy, pairs, ENOUGH)[:2]
+    found = [refitted.swapped(data, pair, reference, hopeless) for _, pair in likely]
     for i, j in combinations(close, 2):
         if not _determined_without(data, i, j):
             continue
         both = h.without(h.masked(data, i), without[i], j)
         if both.data.dof > 0:
-            found.append(h.two_waveforms(data, both, (i, j), reference))
+            found.append(refitted.two_waveforms(data, both, (i, j), reference))
     return found
-
-
-def smallest(at: Fit, onset: int, separation: float) -> tuple[FloatArray, FloatArray]:
-    """(k,) size of a step at the onset that would be detected, and that would be told from every other channel's
-    free waveform (λ = `separation`), SI; ∞ where no size would do."""
-    begin, at = float(at.data.time[onset]), h.coarser(at, ENOUGH)
-    alone = h.step_sds(at, begin)
-    detect = alone * np.sqrt(2.0 * DETECTION_NATS + 2.0 * np.log(30.0))
-    used = np.flatnonzero((at.data.weight > 0).any(axis=0)).tolist()
-    rivals = np.stack([h.step_sds(at, begin, free=j) for j in used])
-    for row, j in enumerate(used):
-        rivals[row, j] = 0.0
-    return detect, np.maximum(detect, rivals.max(axis=0) * np.sqrt(separation))

@@ -73,15 +73,27 @@ def following(fit: Fit, channel: int) -> list[Shape]:
     return found
 
 
-def additive(data: Data, channel: int, peak: float, onset: int, onsets: int = ONSETS) -> list[Shape]:
-    """Faults that do not know the signal: shift, drift, and any curve. `peak` the size of the channel's signal."""
+def additive(
+    data: Data, channel: int, peak: float, onset: int, onsets: int = ONSETS, off: FloatArray | None = None
+) -> list[Shape]:
+    """Faults that do not know the signal: shift, drift, and any curve. `peak` the size of the channel's signal; `off`
+    (n,) what it leaves of the others' prediction, which tells the likeliest instant of a shift."""
     time, size = data.time, SHIFT_PART * max(peak, 10.0 / float(data.weight[:, channel].max()))
     span, one = float(time[-1] - time[onset]), np.ones(1)
     found = [Shape("drift", size * _ramp(time, onset, span), size * one)]
-    for start in np.unique(np.linspace(onset, len(time) - 2, onsets).astype(int)):
+    starts = np.linspace(onset, len(time) - 2, onsets).astype(int)
+    if off is not None:
+        starts = np.append(starts, _change(data.weight[:, channel] ** 2, off))
+    for start in np.unique(starts):
         step = (np.arange(len(time)) >= start).astype(float)[None]
         found.append(Shape("zero_shift", size * step, size * one, onsets, float(time[start])))
     return found
+
+
+def _change(weight: FloatArray, off: FloatArray) -> int:
+    """First sample of the step that explains most of `off` (n,): the largest (Σ_{s≥t} w off)²/Σ_{s≥t} w."""
+    after, total = np.cumsum((weight * off)[::-1])[::-1], np.cumsum(weight[::-1])[::-1]
+    return int(np.argmax(np.where(total > 0, after**2 / np.where(total > 0, total, 1.0), 0.0)[:-2]))
 
 
 def any_curve(data: Data, channel: int, peak: float, onset: int) -> Shape:

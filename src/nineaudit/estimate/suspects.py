@@ -18,7 +18,7 @@ from nineaudit.array import BoolArray
 from nineaudit.estimate.claims import Claim, claims, taken_for
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.prediction import predict
-from nineaudit.estimate.search import DETECTION_NATS
+from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.estimate.student import StudentFit, first_fit
 
 FEW_CHANNELS = 24

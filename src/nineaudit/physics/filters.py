@@ -25,6 +25,12 @@ _DESIGN_FACTOR: Final[dict[str, float]] = {"J211": 2.0775, "ISO6487": 1.25 * 5.0
 SAMPLES_PER_CLASS: Final = 10.0
 """Sampling rate over CFC, at least (SAE J211-1)."""
 _FREQUENCIES = 4096
+_CLOCK = 1e-6
+
+
+def fast_enough(rate: float, class_: float) -> bool:
+    """Whether `rate` (Hz) is ten times the class (SAE J211-1), a clock's rounding aside."""
+    return rate * (1.0 + _CLOCK) >= SAMPLES_PER_CLASS * class_
 
 
 def coefficients(
@@ -41,7 +47,7 @@ def coefficients(
         )
     if not (math.isfinite(class_) and class_ > 0.0):
         raise ConfigurationError("channel frequency class", found=class_, expected="a positive number such as 1000")
-    if not rate >= SAMPLES_PER_CLASS * class_:
+    if not fast_enough(rate, class_):
         raise EstimationError(
             f"sampled too slowly for CFC{class_:g}",
             found=f"{rate:g} Hz",
