@@ -27,6 +27,8 @@ UNEXPLAINED = 1.5
 """Cost per degree of freedom, over the best, that even the best hypothesis may leave before it explains nothing."""
 UNSAID = 0.01
 """Part of the cost that what no budget says may move from one hypothesis to another: it must not name a twin."""
+DECISIVE = ("dropout", "stuck", "spikes")
+"""Faults that a trace shows beyond doubt."""
 WAVEFORMS = ("unknown", "samples")
 DEAD = 0.1
 """Gain factor under which a channel measures nothing of the motion."""
@@ -40,18 +42,18 @@ def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
     out.
     """
     search = case.search
-    best = search.found[0] if search.found else None
+    best = _best(search)
     base = Diagnosis(Status.HEALTHY, (), (), "", healthy_statistic=search.healthy.statistic, limit=case.statistic_limit)
     base = _with_sizes(case, search, base)
     if best is None or best.evidence < DETECTION_NATS:
         return _nothing_found(search, base)
-    candidates = _candidates(case, search, evidence)
+    candidates = _candidates(case, search, best, evidence)
     floor = _floor(search)
     at = f"{best.statistic:.2f} per degree of freedom, {search.healthy.statistic:.3g} with it at its word"
     if (best.statistic > UNEXPLAINED * floor and best.word not in WAVEFORMS) or floor > UNEXPLAINED:
         reason = f"something is wrong, but no fault of one or two channels explains it: at best {at}"
         return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
-    group = _group(search, best, floor)
+    group = [best.channels] if _shown(case, search, best, evidence) else _group(search, best, floor)
     names = [tuple(case.array.channels[c] for c in channels) for channels in group]
     if len(group) == 1:
         fault = candidates[0].fault.replace("_", " ")
@@ -63,6 +65,23 @@ def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
         return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
     reason = f"one of {', '.join(members)}: this motion cannot tell them apart; at best {at}"
     return replace(base, status=Status.AMBIGUOUS, channels=members, candidates=candidates, reason=reason)
+
+
+def _best(search: Search) -> Hypothesis | None:
+    """The best hypothesis, or, where that leaves the record unexplained, the best of its channels that does not."""
+    if not search.found:
+        return None
+    top, enough = search.found[0], UNEXPLAINED * _floor(search)
+    return next((x for x in search.found if x.channels == top.channels and x.statistic <= enough), top)
+
+
+def _shown(case: Case, search: Search, best: Hypothesis, evidence: Mapping[str, str]) -> bool:
+    """Whether the channel's own trace breaks a tie that physics cannot (METHODS.md 3): it shows samples that no sensor
+    at work gives, and those are the fault. A flat top may be one of the motion's."""
+    names = [case.array.channels[c] for c in best.channels]
+    alone = best.word == "samples" and evidence.get(names[0]) in DECISIVE
+    rivals = {x.channels[0] for x in search.found if x.word == "samples" and x.channels != best.channels}
+    return alone and not rivals
 
 
 def _nothing_found(search: Search, base: Diagnosis) -> Diagnosis:
@@ -93,7 +112,8 @@ def _scores(search: Search) -> dict[tuple[int, ...], float]:
 def _group(search: Search, best: Hypothesis, floor: float) -> list[tuple[int, ...]]:
     """The best channel, and every other that nothing sets apart from it."""
     scores = _scores(search)
-    near = [c for c, score in scores.items() if scores[best.channels] - score < ODDS_NATS]
+    odds = ODDS_NATS if len(best.channels) == 1 or best.word == "swap" else FAR
+    near = [c for c, score in scores.items() if scores[best.channels] - score < odds]
     if len(best.channels) == 1 and best.channels[0] in search.without and _is_waveform(search, best):
         channel, data = best.channels[0], search.healthy.data
         mine, needed = search.without[channel], _separation(data)
@@ -121,15 +141,15 @@ def _separation(data: Data) -> float:
     return SEPARATION + UNSAID * data.dof
 
 
-def _candidates(case: Case, search: Search, evidence: Mapping[str, str]) -> tuple[Candidate, ...]:
-    """The best hypothesis of each channel or pair with its probability, most probable first."""
+def _candidates(case: Case, search: Search, top: Hypothesis, evidence: Mapping[str, str]) -> tuple[Candidate, ...]:
+    """The best hypothesis of each channel or pair (`top` of its own) with its probability, most probable first."""
     scores = _scores(search)
-    top = max(scores.values())
-    weight = {c: float(np.exp(max(s - top, -700.0))) for c, s in scores.items()}
+    most = max(scores.values())
+    weight = {c: float(np.exp(max(s - most, -700.0))) for c, s in scores.items()}
     total = sum(weight.values())
     out = []
     for channels in sorted(scores, key=lambda c: -scores[c]):
-        best = next(x for x in search.found if x.channels == channels)
+        best = top if top.channels == channels else next(x for x in search.found if x.channels == channels)
         names = tuple(case.array.channels[c] for c in channels)
         word = evidence.get(names[0], "unknown") if best.word == "samples" else fault_word(best.word, best.parameters)
         out.append(Candidate(names, word, weight[channels] / total, best.statistic, dict(best.parameters)))

@@ -65,14 +65,16 @@ def masked(data: Data, channel: int, samples: BoolArray | None = None) -> Data:
 
 
 def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) -> Fit:
-    """The fit without one channel, from the best of some starts. EstimationError where the others do not tell ω."""
+    """The fit without one channel, from the start whose first step leads lowest. EstimationError where the others do
+    not tell ω."""
     alone = masked(data, channel)
     starts = [healthy.omega]
     if data.array.is_accelerometer[channel]:
         starts += _starts_without(alone, healthy)
-    theta = np.zeros(len(alone.channel))
-    costs = [point(alone, w, theta).cost for w in starts] if len(starts) > 1 else [0.0]
-    return fit(alone, starts[int(np.argmin(costs))], tolerance=ROUGH, hopeless=hopeless)
+        certain = replace(alone, prior_sd=np.zeros_like(alone.prior_sd))
+        first = [fit(certain, start, iterations=1) for start in starts]
+        starts = [min(first, key=lambda f: f.cost).omega]
+    return fit(alone, starts[0], tolerance=ROUGH, hopeless=hopeless)
 
 
 def _starts_without(alone: Data, healthy: Fit) -> list[FloatArray]:
@@ -107,11 +109,13 @@ def small_faults(healthy: Fit, onset: int, reference: float) -> list[Hypothesis]
     return _compare(data, healthy.omega, healthy.theta, shapes, reference)
 
 
-def curves(data: Data, left: Fit, channel: int, onset: int, reference: float) -> list[Hypothesis]:
-    """Shapes that do not know the signal in one channel, about the fit `left` that did not use it."""
+def curves(data: Data, left: Fit, channel: int, onset: int, reference: float, large: bool = False) -> list[Hypothesis]:
+    """Shapes that do not know the signal in one channel, about the fit `left` that did not use it; of a `large` fault,
+    beside which the noise of that fit is nothing, those that follow the signal too."""
     peak = float(np.abs(left.ideal[:, channel]).max())
     off = np.where(data.weight[:, channel] > 0, data.readings[:, channel] - left.ideal[:, channel], 0.0)
     shapes = [*additive(data, channel, peak, onset, off=off), any_curve(data, channel, peak, onset)]
+    shapes += following(left, channel) if large else []
     return _compare(data, left.omega, theta_for(data, left), [(channel, s) for s in shapes], reference)
 
 

@@ -11,13 +11,19 @@ from dataclasses import replace
 import numpy as np
 
 from nineaudit.array import BoolArray
+from nineaudit.estimate.calibration import PARAMETERS
 from nineaudit.estimate.hypotheses import LOOK, Hypothesis, log_evidence, masked, theta_for
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.separation import coarser
-from nineaudit.estimate.shapes import GAIN_SD
+from nineaudit.estimate.shapes import DELAY_SD, GAIN_SD
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import ROUGH, Fit, fit
 
+LONGEST_DELAY = 5e-3
+"""s, looked for."""
+_TIMING = PARAMETERS.index("timing")
+SECOND_NATS = 10.0
+"""Prior odds of a second fault, 1 to 1000, and in which of some tens of pairs."""
 STRETCH_NATS = 8.0
 """What one stretch of wrong samples costs: its place and its length, out of some thousands."""
 
@@ -51,6 +57,32 @@ def scaled(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis 
     occam = 0.5 * ((factor - 1.0) / GAIN_SD) ** 2 if abs(factor) < 3 else 10.0
     evidence = log_evidence(found) - reference - min(occam, 10.0) - float(np.log(GAIN_SD / 0.1))
     return Hypothesis((channel,), "gain", evidence, found.statistic, {"factor": factor})
+
+
+def delayed(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis | None:
+    """The channel late by many samples: moved by the whole number of them that correlates best with what the others
+    predict, the rest of the delay left to its time skew with a prior of 1 ms. None where that is none."""
+    weight, count = data.weight[:, channel], len(data.time)
+    truth, step = left.ideal[:, channel], float(np.median(data.step))
+    most = min(int(LONGEST_DELAY / step), count // 4)
+    seen = np.where(weight > 0, data.readings[:, channel], truth)
+    lags = np.arange(-most, most + 1)
+    inner = truth[most : count - most]
+    misses = [float(((seen[most + lag : count - most + lag] - inner) ** 2).sum()) for lag in lags]
+    lag = int(lags[int(np.argmin(misses))])
+    if lag == 0:
+        return None
+    readings, weights, prior = data.readings.copy(), data.weight.copy(), data.prior_sd.copy()
+    readings[:, channel], weights[:, channel] = np.roll(seen, -lag), np.roll(weight, -lag)
+    weights[count - lag if lag > 0 else 0 : count if lag > 0 else -lag, channel] = 0.0
+    prior[channel, _TIMING] = DELAY_SD
+    part = replace(data, readings=readings, weight=weights, prior_sd=prior)
+    found = fit(part, left.omega, theta_for(part, left), LOOK, ROUGH)
+    place = np.flatnonzero((part.active[0] == channel) & (part.active[1] == _TIMING))
+    rest = float(found.theta[place[0]]) * DELAY_SD if len(place) else 0.0
+    lost = 0.5 * float((weight > 0).sum() - (weights[:, channel] > 0).sum())
+    evidence = log_evidence(found) - lost - reference - float(np.log(len(lags)))
+    return Hypothesis((channel,), "delay", evidence, found.statistic, {"size": lag * step + rest})
 
 
 def without_samples(data: Data, left: Fit, channel: int, wrong: BoolArray, reference: float) -> Hypothesis:
@@ -89,8 +121,8 @@ def left_out(data: Data, left: Fit, channel: int, reference: float) -> Hypothesi
 
 
 def two_waveforms(data: Data, left: Fit, pair: tuple[int, int], reference: float) -> Hypothesis:
-    """Two channels free, `left` the fit without both."""
-    price = sum(_price(data, left, channel) for channel in pair)
+    """Two channels free, `left` the fit without both. Two independent faults are as rare again as one."""
+    price = sum(_price(data, left, channel) for channel in pair) + SECOND_NATS
     return Hypothesis(pair, "unknown", log_evidence(left) - price - reference, left.statistic)
 
 

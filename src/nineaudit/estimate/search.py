@@ -27,6 +27,8 @@ WHOLE = 1.1
 FAR, HOPELESS = 300.0, 2.0
 """Cost by which a channel's absence may mend less than the best one's; cost per degree of freedom over the lowest at
 which a fit without a channel is given up."""
+LARGE = 3.0
+"""What a sample of a channel costs, over what a healthy one does, where its fault bends the fit that uses it."""
 CLOSE_NATS = 20.0
 """Linear evidence under the best shape's at which another needs no fit of its own."""
 WORTH_NATS = 4.0
@@ -128,15 +130,16 @@ def _closely(
 ) -> list[Hypothesis]:
     """Everything about one channel, the best shapes fitted on their own."""
     shapes = [(x, healthy) for x in small if x.channels == (channel,)]
-    shapes += [(x, left) for x in h.curves(data, left, channel, onset, reference)]
+    large = healthy.cost - left.cost > LARGE * float((data.weight[:, channel] > 0).sum())
+    shapes += [(x, left) for x in h.curves(data, left, channel, onset, reference, large)]
     shapes.sort(key=lambda pair: -pair[0].evidence)
     likely = [pair for pair in shapes[:CONFIRMED] if pair[0].evidence > shapes[0][0].evidence - CLOSE_NATS]
     found = [h.confirm(data, near, x, reference) for x, near in likely]
     found.append(refitted.any_waveform(data, left, channel, reference))
     # where a small gain mends the record, a large one is the same
     mended = found[0].word == "gain" and found[0].statistic <= WHOLE
-    gain = None if mended else refitted.scaled(data, left, channel, reference)
-    found += [x for x in (gain, refitted.noisy(data, left, channel, reference)) if x is not None]
+    ways = (refitted.noisy, refitted.delayed) if mended else (refitted.scaled, refitted.noisy, refitted.delayed)
+    found += [x for way in ways if (x := way(data, left, channel, reference)) is not None]
     if wrong.any():
         found.append(refitted.without_samples(data, left, channel, wrong, reference))
     return found

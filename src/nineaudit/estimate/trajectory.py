@@ -86,8 +86,8 @@ def fit(
 ) -> Fit:
     """Minimise the cost from ω `start` (n+1,3) until it settles to `tolerance`.
 
-    A fit that has not settled within `iterations`, or after three costs more than `hopeless` and no longer halves its
-    cost, says so: `converged`. EstimationError where ω is not determined.
+    A fit that has not settled within `iterations`, or after three neither costs nor is promised less than `hopeless`,
+    says so: `converged`. EstimationError where ω is not determined.
     """
     here = point(data, start, np.zeros(len(data.channel)) if theta is None else theta)
     for iteration in range(1, iterations + 1):
@@ -104,7 +104,7 @@ def fit(
         size = here.cost + data.dof
         missed = abs(previous - promised - here.cost)
         converged = promised <= tolerance.gain * size or missed <= tolerance.promise * size
-        lost = iteration >= 3 and here.cost > max(hopeless, 0.5 * previous)
+        lost = iteration >= 3 and min(previous - promised, here.cost) > hopeless
         if converged or stuck or lost:
             break
     return Fit(data, here.omega, here.theta, here.cost, converged, iteration, log_determinant(solved.schur))
