@@ -53,7 +53,9 @@ def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
     if (best.statistic > UNEXPLAINED * floor and best.word not in WAVEFORMS) or floor > UNEXPLAINED:
         reason = f"something is wrong, but no fault of one or two channels explains it: at best {at}"
         return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
-    group = [best.channels] if _shown(case, search, best, evidence) else _group(search, best, floor)
+    group = _group(search, best, floor)
+    shown = _shown(case, search, evidence)
+    group = [best.channels] if shown == [best] else group + [x.channels for x in shown if x.channels not in group]
     names = [tuple(case.array.channels[c] for c in channels) for channels in group]
     if len(group) == 1:
         fault = candidates[0].fault.replace("_", " ")
@@ -75,13 +77,13 @@ def _best(search: Search) -> Hypothesis | None:
     return next((x for x in search.found if x.channels == top.channels and x.statistic <= enough), top)
 
 
-def _shown(case: Case, search: Search, best: Hypothesis, evidence: Mapping[str, str]) -> bool:
-    """Whether the channel's own trace breaks a tie that physics cannot (METHODS.md 3): it shows samples that no sensor
-    at work gives, and those are the fault. A flat top may be one of the motion's."""
-    names = [case.array.channels[c] for c in best.channels]
-    alone = best.word == "samples" and evidence.get(names[0]) in DECISIVE
-    rivals = {x.channels[0] for x in search.found if x.word == "samples" and x.channels != best.channels}
-    return alone and not rivals
+def _shown(case: Case, search: Search, evidence: Mapping[str, str]) -> list[Hypothesis]:
+    """Hypotheses of samples that a channel's own trace shows to be what no sensor at work gives, and that explain the
+    record: alone and best, it breaks a tie that physics cannot (METHODS.md 3); else its channel stays in the group.
+    A flat top may be one of the motion's."""
+    enough = UNEXPLAINED * _floor(search)
+    telling = [x for x in search.found if x.word == "samples" and x.statistic <= enough and x.evidence > DETECTION_NATS]
+    return [x for x in telling if evidence.get(case.array.channels[x.channels[0]]) in DECISIVE]
 
 
 def _nothing_found(search: Search, base: Diagnosis) -> Diagnosis:

@@ -24,8 +24,8 @@ LONGEST_DELAY = 5e-3
 _TIMING = PARAMETERS.index("timing")
 SECOND_NATS = 10.0
 """Prior odds of a second fault, 1 to 1000, and in which of some tens of pairs."""
-STRETCH_NATS = 8.0
-"""What one stretch of wrong samples costs: its place and its length, out of some thousands."""
+TRACE_NATS = 8.0
+"""What it costs that a trace may show samples as wrong that are not."""
 
 
 def scaled(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis | None:
@@ -34,9 +34,7 @@ def scaled(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis 
     the rest left to a fit with a prior of a tenth; repeated until it settles.
     """
     truth, weight = left.ideal[:, channel], data.weight[:, channel]
-    noise = 4.0 * float((weight > 0).sum())  # twice the noise of a reading, squared, in units of it
-    signal = float(((weight * truth) ** 2).sum())
-    if signal < 10.0 * noise:
+    if _lost_in_noise(data, left, channel):
         return None
     factor = float((weight**2 * truth) @ data.readings[:, channel]) / float((weight**2 * truth) @ truth)
     prior = data.prior_sd.copy()
@@ -59,9 +57,22 @@ def scaled(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis 
     return Hypothesis((channel,), "gain", evidence, found.statistic, {"factor": factor})
 
 
+def _lost_in_noise(data: Data, left: Fit, channel: int) -> bool:
+    """Whether what the others predict of a channel is hardly more than its own noise, twice that of a reading."""
+    weight = data.weight[:, channel]
+    return float(((weight * left.ideal[:, channel]) ** 2).sum()) < 40.0 * float((weight > 0).sum())
+
+
 def delayed(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis | None:
     """The channel late by many samples: moved by the whole number of them that correlates best with what the others
-    predict, the rest of the delay left to its time skew with a prior of 1 ms. None where that is none."""
+    predict, the rest of the delay left to its time skew with a prior of 1 ms. None where that is none, or where the
+    prediction is lost in noise.
+
+    Its noise then meets another stretch of the others': costs differ by chance with variance 4 × 0.6 a sample (0.6 of
+    it left by the fit), of which two standard deviations are taken off.
+    """
+    if _lost_in_noise(data, left, channel):
+        return None
     weight, count = data.weight[:, channel], len(data.time)
     truth, step = left.ideal[:, channel], float(np.median(data.step))
     most = min(int(LONGEST_DELAY / step), count // 4)
@@ -80,20 +91,21 @@ def delayed(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis
     found = fit(part, left.omega, theta_for(part, left), LOOK, ROUGH)
     place = np.flatnonzero((part.active[0] == channel) & (part.active[1] == _TIMING))
     rest = float(found.theta[place[0]]) * DELAY_SD if len(place) else 0.0
-    lost = 0.5 * float((weight > 0).sum() - (weights[:, channel] > 0).sum())
-    evidence = log_evidence(found) - lost - reference - float(np.log(len(lags)))
+    used = float((weights[:, channel] > 0).sum())
+    price = 0.5 * (float((weight > 0).sum()) - used) + float(np.sqrt(2.4 * used)) + float(np.log(len(lags)))
+    evidence = log_evidence(found) - price - reference
     return Hypothesis((channel,), "delay", evidence, found.statistic, {"size": lag * step + rest})
 
 
 def without_samples(data: Data, left: Fit, channel: int, wrong: BoolArray, reference: float) -> Hypothesis:
     """The channel without the samples that its own trace shows to be wrong, and as measured elsewhere.
 
-    A flat top or a dropout is predicted by its level: those samples cost what healthy ones are expected to.
+    A flat top or a dropout is predicted by its level: those samples cost what healthy ones are expected to. One fault
+    makes many spikes, and the trace alone tells their places.
     """
     part = masked(data, channel, wrong)
     found = fit(part, left.omega, theta_for(part, left), LOOK, ROUGH)
-    stretches = int((np.diff(wrong.astype(int), prepend=0) == 1).sum())
-    evidence = log_evidence(found) - 0.5 * float(wrong.sum()) - reference - STRETCH_NATS * stretches
+    evidence = log_evidence(found) - 0.5 * float(wrong.sum()) - reference - TRACE_NATS
     return Hypothesis((channel,), "samples", evidence, found.statistic)
 
 
