@@ -1,0 +1,1 @@
+"""The schemes of the source papers, one module a paper: arrays in, arrays out."""

@@ -1,0 +1,15 @@
+"""The published numbers of the source papers, standards and derivations, computed afresh (METHODS.md 7).
+
+One module a source; each has `checks()`, a list of Published.
+"""
+
+from __future__ import annotations
+
+from nineaudit.selftest.published import Published
+
+__all__ = ["Published", "all_checks"]
+
+
+def all_checks() -> list[Published]:
+    """Every published number with ours beside it, in the order of the sources."""
+    return []
