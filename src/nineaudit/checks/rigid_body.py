@@ -71,9 +71,8 @@ def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
 
 
 def whole_record(case: Case, *, false_alarm: float) -> Measure | tuple[Measure, ...] | NotApplicable:
-    """RB303: cost per degree of freedom of the whole record, calibration errors fitted within their priors [METHODS 2].
-
-    Small faults that no single sample shows add up here.
+    """RB303: cost per degree of freedom of the whole record, calibration errors fitted within their priors [METHODS 2],
+    and the evidence of the best fault hypothesis: small faults that no single sample shows add up here.
     """
     if not parity.redundant(case.array):
         return NotApplicable(_nothing_to_spare(case))
@@ -83,15 +82,19 @@ def whole_record(case: Case, *, false_alarm: float) -> Measure | tuple[Measure, 
     if len(case.array) > FEW_CHANNELS:
         return NotApplicable(f"more than {FEW_CHANNELS} channels without rates on three axes; RB302 tests their parity")
     limit = closed_form.limit_per_dof(case.fit_data.dof, false_alarm)
-    return Measure(case.statistic, limit, "1", detail="cost per degree of freedom")
+    cost = Measure(case.statistic, limit, "1", detail="cost per degree of freedom")
+    return cost, _evidence(max((x.evidence for x in case.search.found), default=0.0))
+
+
+def _evidence(nats: float) -> Measure:
+    return Measure(max(nats, 0.0), DETECTION_NATS, "1", detail="evidence in nats of a fault in one channel")
 
 
 def _by_student(case: Case, limit: float) -> tuple[Measure, ...]:
     """A typical sample of a large array, and the channel of which a fault explains most."""
     found = [Measure(case.student.statistic, limit, "1", detail="cost per degree of freedom of a typical sample")]
     if case.suspects:
-        nats = max(case.suspects[0].claim.evidence, 0.0)
-        found.append(Measure(nats, DETECTION_NATS, "1", detail="evidence in nats of a fault in one channel"))
+        found.append(_evidence(case.suspects[0].claim.evidence))
     return tuple(found)
 
 
