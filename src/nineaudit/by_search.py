@@ -153,7 +153,8 @@ def _candidates(case: Case, search: Search, top: Hypothesis, evidence: Mapping[s
     for channels in sorted(scores, key=lambda c: -scores[c]):
         best = top if top.channels == channels else next(x for x in search.found if x.channels == channels)
         names = tuple(case.array.channels[c] for c in channels)
-        word = evidence.get(names[0], "unknown") if best.word == "samples" else fault_word(best.word, best.parameters)
+        shown = evidence.get(names[0], "unknown") if best.word in WAVEFORMS else best.word
+        word = fault_word(shown, best.parameters)
         out.append(Candidate(names, word, weight[channels] / total, best.statistic, dict(best.parameters)))
     return tuple(out)
 

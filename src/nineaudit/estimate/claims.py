@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from math import lgamma
 
 import numpy as np
-from scipy.special import gammaln
 
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.estimate.prediction import Prediction
@@ -72,7 +72,7 @@ def evidence(p: Prediction, baseline: FloatArray, columns: FloatArray) -> tuple[
 
 def log_student(x: FloatArray) -> FloatArray:
     """Log density of Student's t with ν = FREEDOM."""
-    constant = gammaln(0.5 * (FREEDOM + 1.0)) - gammaln(0.5 * FREEDOM) - 0.5 * np.log(FREEDOM * np.pi)
+    constant = lgamma(0.5 * (FREEDOM + 1.0)) - lgamma(0.5 * FREEDOM) - 0.5 * np.log(FREEDOM * np.pi)
     return np.asarray(constant - 0.5 * (FREEDOM + 1.0) * np.log1p(x**2 / FREEDOM))
 
 
