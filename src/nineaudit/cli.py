@@ -176,6 +176,19 @@ def demo(
     _print(demonstration.run(demonstration.fresh_folder(output)))
 
 
+@app.command(epilog=example("nineaudit selftest --date 2026-01-31"))
+def selftest(
+    date: Annotated[str | None, typer.Option(metavar="YYYY-MM-DD", help="Of the record; default: now.")] = None,
+    json: Annotated[Path | None, typer.Option(metavar="F", help="Write the record for machines.")] = None,
+) -> None:
+    """Compute the published numbers afresh and print the validation record. Exit code 1 where one is missed."""
+    from nineaudit import commands
+
+    said, passed = commands.selftested(date, json)
+    _print(said)
+    raise typer.Exit(0 if passed else 1)
+
+
 for name, reference in (("rules", rules_app), ("rig", rig_app)):
     app.add_typer(reference, name=name, result_callback=typer.echo)
 

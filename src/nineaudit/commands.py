@@ -94,6 +94,17 @@ def written(recording: Recording, output: Path, dbc: Sequence[Path] = (), force:
     return [f"{output}: {'; '.join((size, *recording.source.notes, *done.notes))}", *said]
 
 
+def selftested(date: str | None = None, json: Path | None = None) -> tuple[list[str], bool]:
+    """The validation record as lines, and whether every published number came out."""
+    from nineaudit.selftest import all_checks, record
+
+    when = record.day(date)
+    checks = all_checks()
+    if json is not None:
+        write_text(json, as_json(record.document(checks, when)) + "\n")
+    return record.lines(checks, when), all(check.passed for check in checks)
+
+
 def rules_lines(book: Rulebook) -> list[str]:
     """Code, severity and title of every rule."""
     return [f"{rule.code}  {rule.severity:<7}  {rule.title}" for rule in book.rules]

@@ -70,6 +70,17 @@ def response(frequency: FloatArray, class_: float, rate: float, standard: Standa
     return np.asarray(np.abs(once) ** 2)
 
 
+def corner(class_: float, rate: float, standard: Standard = "J211") -> float:
+    """−3 dB frequency (Hz) of both passes; errors as `coefficients`.
+
+    Both leave 1/(1 + (tan(πf/rate)/ωa)⁴) of the amplitude, hence f = rate/π · atan((√2 − 1)^¼ ωa): 5/3 of the class
+    where the sampling is fast [SAE J211-1].
+    """
+    coefficients(class_, rate, standard)
+    warped = math.tan(math.pi * class_ * _DESIGN_FACTOR[standard] / rate)
+    return rate / math.pi * math.atan((math.sqrt(2.0) - 1.0) ** 0.25 * warped)
+
+
 def mean_noise(class_: float, rate: float, length: int) -> float:
     """Variance of the mean of `length` samples of white noise behind the filter, over σ²/length (1 for white noise).
 
