@@ -38,6 +38,12 @@ def alem(
     return _rigid(time, _sines(time, *_EULER), _sines(time, *_SHIFT), gravity)
 
 
+def alem_path(rate_hz: float = 10_000.0, duration_s: float | None = None) -> tuple[Derivatives, Derivatives]:
+    """Yaw, pitch, roll (rad) and displacement (m) of `alem`, each with its first two derivatives, (n,3)."""
+    time = timeline(rate_hz, 2.0 if duration_s is None else duration_s, 0.0)
+    return _sines(time, *_EULER), _sines(time, *_SHIFT)
+
+
 def alem_quiet(
     rate_hz: float = 10_000.0,
     duration_s: float | None = None,
