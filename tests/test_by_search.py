@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -120,3 +122,18 @@ def test_what_the_closed_forms_cannot_settle_goes_to_the_search(motion, fault, c
     result = audit(simulate(rig, motion, faults=[fault] if fault else [], seed=seed).recording)
     assert set(result.diagnosis.channels) == culprits, result.diagnosis.reason
     assert result.verdict == ("fail" if culprits else "pass")
+
+
+@pytest.mark.parametrize("preset", ["naap-3222", "triax-3", "triax-4", "naap-gyro"])
+def test_a_record_without_rest_is_fitted_from_an_unknown_start(preset):
+    """[Alem77] Table 1 moves from the first sample on; ω(0) is 40 rad/s and told by its products alone. A stretch in
+    which accelerometers stay the same is no rest."""
+    text = re.sub(r"(?m)^pre_trigger.*$", "", preset_text(preset))
+    for seed in range(2):
+        done = simulate(parse_rig(text), "alem", seed=seed, rate_hz=5000.0, duration_s=0.5)
+        case = Case(done.recording)
+        assert case.rest is None
+        assert diagnose(case).status is Status.HEALTHY
+        at = case.healthy.motion.omega
+        truth = np.stack([np.interp(case.condensed.time, done.truth.time, w) for w in done.truth.omega.T], axis=1)
+        assert np.abs(at - truth).max() < 0.05 * np.abs(truth).max()

@@ -56,7 +56,8 @@ class Case:
     def rest(self) -> Quiet | None:
         """The quiet interval: the rig's pre_trigger, or the quietest stretch that looks like rest, or None."""
         stated = self.recording.rig.pre_trigger
-        return find_quiet(self.time, self.recording.readings, self.array.values("noise"), stated)
+        noise, anywhere = self.array.values("noise"), has_rates(self.array)
+        return find_quiet(self.time, self.recording.readings, noise, stated, anywhere)
 
     @property
     def required_rest(self) -> Quiet:

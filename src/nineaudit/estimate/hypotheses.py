@@ -18,6 +18,7 @@ import numpy as np
 from nineaudit.array import BoolArray, FloatArray, IntArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate.model import Data, Extra
+from nineaudit.estimate.motion import has_rates
 from nineaudit.estimate.normal import Solved, eliminate, normal_equations
 from nineaudit.estimate.point import point
 from nineaudit.estimate.shapes import Shape, additive, any_curve, following
@@ -45,8 +46,15 @@ class Hypothesis:
 
 
 def healthy_fit(data: Data) -> Fit:
-    """The fit of the hypothesis that nothing is wrong. EstimationError where ω cannot be told."""
-    return fit(data, first_omega(data), hopeless=HOPELESS * data.dof)
+    """The fit of the hypothesis that nothing is wrong. EstimationError where ω cannot be told.
+
+    Products of ω do not tell its sign: with neither rest nor rate sensors the fit starts again from −ω (METHODS.md 2).
+    """
+    found = fit(data, first_omega(data), hopeless=HOPELESS * data.dof)
+    if (data.still > 0).any() or has_rates(data.array):
+        return found
+    other = fit(data, -found.omega, hopeless=HOPELESS * data.dof)
+    return min(found, other, key=lambda f: f.cost)
 
 
 def log_evidence(found: Fit) -> float:

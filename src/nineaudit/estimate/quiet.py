@@ -33,9 +33,14 @@ class Quiet:
 
 
 def find_quiet(
-    time: FloatArray, readings: FloatArray, noise: FloatArray, stated: tuple[float, float] | None
+    time: FloatArray,
+    readings: FloatArray,
+    noise: FloatArray,
+    stated: tuple[float, float] | None,
+    anywhere: bool = True,
 ) -> Quiet | None:
-    """The stated interval, or the quietest stretch of 2 % of the record (16 samples at least).
+    """The stated interval, or the quietest stretch of 2 % of the record (16 samples at least), `anywhere` or only where
+    the record begins or ends: accelerometers that stay the same may be those of a body that turns steadily.
 
     `time` (n,) s, `readings` (n,k), `noise` (k,) stated noise or NaN. A stretch found counts as rest when each
     channel's scatter in it is under three times its stated noise, or, with none stated, under 2 % of its scatter
@@ -52,10 +57,10 @@ def find_quiet(
                 expected=f"at least {SHORTEST} samples between {time[0]:.6g} s and {time[-1]:.6g} s",
             )
         return Quiet(start, stop, float(time[start]), float(time[stop - 1]), stated=True)
-    return _quietest(time, readings, noise)
+    return _quietest(time, readings, noise, anywhere)
 
 
-def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray) -> Quiet | None:
+def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray, anywhere: bool) -> Quiet | None:
     length = max(SHORTEST, readings.shape[0] // 50)
     if readings.shape[0] < 2 * length:
         return None
@@ -63,7 +68,8 @@ def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray) -> Quie
     overall = np.nanstd(readings[:, alive], axis=0)
     allowed = np.where(np.isfinite(noise[alive]), 3.0 * noise[alive], 0.02 * overall)
     allowed = np.where(allowed > 0, allowed, np.inf)
-    starts = np.arange(0, readings.shape[0] - length + 1, max(1, length // 4))
+    last = readings.shape[0] - length
+    starts = np.arange(0, last + 1, max(1, length // 4)) if anywhere else np.array([0, last])
     scatter = _windowed_sd(np.nan_to_num(readings[:, alive] - np.nanmean(readings[:, alive], axis=0)), starts, length)
     # the median channel chooses, so that one noisy channel cannot hide the rest of the array's rest
     badness = np.median(scatter / allowed, axis=1)

@@ -1,0 +1,66 @@
+"""Uncertainty of an output through the whole-record fit, by source.
+
+For an output with derivatives f_ω by the nodes and f_θ by the calibration errors (what they do through a0 among them),
+v = f_θ − Xᵀf_ω, S the posterior precision of θ (posterior.py):
+
+    variance = f_ω Hωω⁻¹ f_ωᵀ + v S⁻¹ vᵀ + Σ f_a0 (AᵀA)⁻¹ f_a0ᵀ
+
+A calibration error of one prior standard deviation in θ_j moves the estimate away from the truth by the covariance of
+the output with θ_j, (v S⁻¹)_j: what the fit has not found out of it. Their squares are the rows; noise has the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nineaudit.array import FloatArray
+from nineaudit.estimate import calibration
+from nineaudit.estimate.at_their_word import SOURCES
+from nineaudit.estimate.normal import Solved, eliminate, normal_equations
+from nineaudit.estimate.outputs import Gradient
+from nineaudit.estimate.posterior import Posterior, a0_response, posterior
+from nineaudit.estimate.trajectory import Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """A fit with what carries its uncertainty: `known` its posterior, `through` X (3(n+1),q), and the derivatives of
+    a0 by ω at the two nodes (n,3,6) and by θ (n,3,q)."""
+
+    known: Posterior
+    solved: Solved
+    through: FloatArray
+    a0_by_omega: FloatArray
+    a0_by_theta: FloatArray
+
+    def rows(self, gradient: Gradient) -> dict[str, float]:
+        """Standard uncertainty of an output with this gradient, by source."""
+        data = self.known.fit.data
+        half, slope = 0.5 * gradient.omega, gradient.alpha / data.step[:, None]
+        nodes = np.zeros((len(half) + 1, 3))
+        by_a0 = np.einsum("ni,nij->nj", gradient.a0, self.a0_by_omega)
+        nodes[:-1] += half - slope + by_a0[:, :3]
+        nodes[1:] += half + slope + by_a0[:, 3:]
+        by_omega, by_theta = nodes.ravel(), np.einsum("ni,niq->q", gradient.a0, self.a0_by_theta)
+        v = by_theta - by_omega @ self.through
+        left = self.known.theta @ v
+        noise = float(by_omega @ self.solved.factor.solve(by_omega[:, None])[:, 0] + v @ left)
+        noise += float(np.einsum("ni,nij,nj->", gradient.a0, self.known.a0, gradient.a0))
+        return self._by_source(left, noise)
+
+    def _by_source(self, left: FloatArray, variance: float) -> dict[str, float]:
+        parameter = self.known.fit.data.active[1]
+        out = {}
+        for source, members in SOURCES.items():
+            mine = np.isin(parameter, [calibration.PARAMETERS.index(m) for m in members])
+            out[source] = float(np.linalg.norm(left[: len(parameter)][mine]))
+        noise = variance - sum(value**2 for value in out.values())
+        return out | {"noise": float(np.sqrt(max(noise, 0.0)))}
+
+
+def smoothed(fit: Fit) -> Smoothed:
+    """What carries the uncertainty of a fit. EstimationError where the readings do not determine ω."""
+    solved = eliminate(normal_equations(fit.point))
+    return Smoothed(posterior(fit), solved, solved.through(), *a0_response(fit.point))
