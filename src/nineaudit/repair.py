@@ -88,7 +88,7 @@ def provenance(
         "rulebook": {"sha256": audit.rulebook.sha256},
         "channels": list(rebuilt.channels),
         "interval_s": list(rebuilt.interval),
-        "samples_replaced": int(rebuilt.replaced.sum()),
+        "samples_replaced": int(rebuilt.replaced.any(axis=1).sum()),
         "samples": int(rebuilt.replaced.shape[0]),
         "method": rebuilt.method,
         "undone": _undone(rebuilt),

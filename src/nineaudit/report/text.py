@@ -50,7 +50,8 @@ def diagnosis_sentence(diagnosis: Diagnosis) -> str:
     best = diagnosis.candidates[0] if diagnosis.candidates else None
     if status == "isolated" and best:
         fault = fault_word(best.fault)
-        return f"{joined(names)} is at fault: {fault}, probability {probability(best.probability)}"
+        verb = "is" if len(names) == 1 else "are"
+        return f"{joined(names)} {verb} at fault: {fault}, probability {probability(best.probability)}"
     if status == "ambiguous":
         together = probability(sum(c.probability for c in diagnosis.candidates if set(c.channels) <= set(names)))
         return f"the fault is in {joined(names, 'or')}, probability {together}; this motion cannot tell them apart"
