@@ -176,6 +176,28 @@ def demo(
     _print(demonstration.run(demonstration.fresh_folder(output)))
 
 
+@app.command(epilog=example("nineaudit budget rig.toml --html budget.html"))
+def budget(
+    rig: RigFile,
+    recording: Annotated[
+        Path | None, typer.Option("--recording", metavar="REC", help="Of this recording; default: a typical motion.")
+    ] = None,
+    motion: Annotated[
+        str, typer.Option(metavar="NAME", help="The typical motion: sled, drop, planar, oblique, general, ...")
+    ] = "general",
+    html: Annotated[Path | None, typer.Option(metavar="F", help="Write the page, with the budget over time.")] = None,
+    dbc: Dbc = None,
+) -> None:
+    """How well the results will be known, from which sources, what would help most, and what the layout can prove."""
+    from nineaudit import commands
+    from nineaudit.outputs import protect
+    from nineaudit.rig import load_rig
+
+    instrument = load_rig(rig)
+    protect([html], [rig, recording, *(dbc or instrument.dbc)])
+    _print(commands.budgeted(instrument, recording, motion=motion, html=html, dbc=dbc or ()))
+
+
 @app.command(epilog=example("nineaudit selftest --date 2026-01-31"))
 def selftest(
     date: Annotated[str | None, typer.Option(metavar="YYYY-MM-DD", help="Of the record; default: now.")] = None,

@@ -94,6 +94,26 @@ def written(recording: Recording, output: Path, dbc: Sequence[Path] = (), force:
     return [f"{output}: {'; '.join((size, *recording.source.notes, *done.notes))}", *said]
 
 
+def budgeted(
+    rig: Rig, recording: Path | None, *, motion: str = "general", html: Path | None = None, dbc: Sequence[Path] = ()
+) -> list[str]:
+    """The budget of a rig in a typical motion, or of a recording, as lines; as a page where `html` is given."""
+    from nineaudit.budgets import budget_of, text, typical
+    from nineaudit.case import Case
+    from nineaudit.readers import read
+
+    found = (
+        typical(rig, motion) if recording is None else budget_of(Case(read(recording, rig, dbc=dbc)), str(recording))
+    )
+    said = list(text.lines(found))
+    if html is not None:
+        from nineaudit.budgets import page
+
+        write_text(html, page.render(found))
+        said += ["", str(html)]
+    return said
+
+
 def selftested(date: str | None = None, json: Path | None = None) -> tuple[list[str], bool]:
     """The validation record as lines, and whether every published number came out."""
     from nineaudit.selftest import all_checks, record

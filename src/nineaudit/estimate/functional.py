@@ -18,6 +18,7 @@ import numpy as np
 from nineaudit.array import FloatArray
 from nineaudit.estimate import calibration
 from nineaudit.estimate.at_their_word import SOURCES
+from nineaudit.estimate.motion import Motion
 from nineaudit.estimate.normal import Solved, eliminate, normal_equations
 from nineaudit.estimate.outputs import Gradient
 from nineaudit.estimate.posterior import Posterior, a0_response, posterior
@@ -34,6 +35,11 @@ class Smoothed:
     through: FloatArray
     a0_by_omega: FloatArray
     a0_by_theta: FloatArray
+
+    @property
+    def motion(self) -> Motion:
+        """ω, α and a0 at the samples."""
+        return self.known.fit.motion
 
     def rows(self, gradient: Gradient) -> dict[str, float]:
         """Standard uncertainty of an output with this gradient, by source."""

@@ -24,7 +24,13 @@ Standard = Literal["J211", "ISO6487"]
 _DESIGN_FACTOR: Final[dict[str, float]] = {"J211": 2.0775, "ISO6487": 1.25 * 5.0 / 3.0}
 SAMPLES_PER_CLASS: Final = 10.0
 """Sampling rate over CFC, at least (SAE J211-1)."""
+CLASSES: Final = (60.0, 180.0, 600.0, 1000.0)
+"""Classes of SAE J211-1."""
+LOSS_DB: Final = 1.0
+"""What an earlier filter may have taken at the corner of the next one, dB, before that counts as filtering twice: from
+CFC1000 to CFC600 it is 0.5 dB, to the same class 3 dB."""
 _FREQUENCIES = 4096
+_ABOVE, _LEFT, _PERIODS = 1.5, 0.1, 4.0
 _CLOCK = 1e-6
 
 
@@ -81,6 +87,28 @@ def corner(class_: float, rate: float, standard: Standard = "J211") -> float:
     return rate / math.pi * math.atan((math.sqrt(2.0) - 1.0) ** 0.25 * warped)
 
 
+def class_of_noise(noise: FloatArray, rate: float) -> float | None:
+    """The class whose filter has acted on `noise` (n,k), a record at rest sampled at `rate` Hz; None where none shows.
+
+    The share of its power above 1.5 times a class's −3 dB frequency is 1 − 3 f/rate for white noise, and a hundredth of
+    that behind the filter: under a tenth of it, the filter has acted. The lowest class of which that is so and of whose
+    corner the record holds four periods. An analogue filter of like bandwidth looks the same.
+    """
+    values = noise[:, np.isfinite(noise).all(axis=0) & (np.ptp(noise, axis=0) > 0.0)]
+    if len(values) < 4 or values.shape[1] == 0:
+        return None
+    power = np.abs(np.fft.rfft((values - values.mean(axis=0)) * np.hanning(len(values))[:, None], axis=0)) ** 2
+    spectrum = (power / power.sum(axis=0)).mean(axis=1)
+    frequency = np.fft.rfftfreq(len(values), 1.0 / rate)
+    for class_ in CLASSES:
+        if not fast_enough(rate, class_) or len(values) / rate * corner(class_, rate) < _PERIODS:
+            continue
+        limit = _ABOVE * corner(class_, rate)
+        if float(spectrum[frequency > limit].sum()) < _LEFT * (1.0 - 2.0 * limit / rate):
+            return class_
+    return None
+
+
 def mean_noise(class_: float, rate: float, length: int) -> float:
     """Variance of the mean of `length` samples of white noise behind the filter, over σ²/length (1 for white noise).
 
@@ -113,6 +141,27 @@ def cfc(values: FloatArray, rate: float, class_: float, standard: Standard = "J2
     extended = np.concatenate([head, values, tail])
     both = _one_pass(_one_pass(extended, b, a)[::-1], b, a)[::-1]
     return np.ascontiguousarray(both[pad : pad + len(values)])
+
+
+def once(
+    values: FloatArray, rate: float, class_: float, already: float | None, standard: Standard = "J211"
+) -> FloatArray:
+    """`cfc`, unless a filter of class `already` (None: none) has acted on `values` that leaves no room for this one.
+
+    ConfigurationError where `already` has taken more than LOSS_DB at the corner of `class_`; else as `cfc`.
+    """
+    if already is not None:
+        edge = corner(class_, rate, standard)
+        warped = math.tan(math.pi * edge / rate) / math.tan(math.pi * already * _DESIGN_FACTOR[standard] / rate)
+        lost = 20.0 * math.log10(1.0 + warped**4) if fast_enough(rate, already) else 0.0
+        if lost > LOSS_DB:
+            raise ConfigurationError(
+                f"filtered twice: CFC{class_:g} after CFC{already:g} leaves −{lost + 3.01:.1f} dB at {edge:.0f} Hz",
+                found=f"a recording of CFC{already:g}",
+                expected="−3 dB there, of one filter",
+                advice="take the recording as it is, or start from unfiltered data",
+            )
+    return cfc(values, rate, class_, standard)
 
 
 def _one_pass(x: FloatArray, b: tuple[float, float, float], a: tuple[float, float]) -> FloatArray:
