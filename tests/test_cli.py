@@ -15,8 +15,10 @@ import pytest
 import typer.main
 from jsonschema import Draft202012Validator
 
+from calibration_sheets import write_all
 from nineaudit import cli
 from nineaudit.report import result_schema
+from nineaudit.rig import load_rig
 from nineaudit.simulate import MOTIONS
 from nineaudit.writers import WRITERS
 
@@ -42,6 +44,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 f"{shlex.quote(sys.executable)} -m nineaudit {line}", shell=True, capture_output=True, check=False
             )
             assert done.returncode in (0, 1), done.stderr
+    write_all(load_rig(folder / "rig.toml"), folder)
     return folder
 
 

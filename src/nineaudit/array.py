@@ -32,7 +32,8 @@ class Sensor:
     effect. `full_scale` (the rig file's ``range``) in m/s² or rad/s. Standard uncertainties: `u_gain`
     relative, `u_zero` and `noise` in m/s² or rad/s, `u_alignment` rad (each of two tilts), `u_position`
     m (each coordinate), `u_timing` s. `noise` None: to be estimated from the quiet interval.
-    `to_si` converts a value in the rig's unit (`unit`) to SI.
+    `to_si` converts a value in the rig's unit (`unit`) to SI, calibrated: the unit over `scale`. A value read is
+    value·to_si − `offset`, `offset` in m/s² or rad/s.
     """
 
     channel: str
@@ -42,6 +43,8 @@ class Sensor:
     signal: str
     unit: str = "m/s^2"
     to_si: float = 1.0
+    scale: float = 1.0
+    offset: float = 0.0
     full_scale: float | None = None
     serial: str | None = None
     u_gain: float = 0.0

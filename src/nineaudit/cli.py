@@ -18,6 +18,7 @@ from typing import Annotated, NoReturn, TypeVar
 
 import typer
 
+from nineaudit.calibrate import calibrate_app
 from nineaudit.errors import NineauditError
 from nineaudit.options import Dbc, Force, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
 from nineaudit.reference import rig_app, rules_app
@@ -211,7 +212,7 @@ def selftest(
     raise typer.Exit(0 if passed else 1)
 
 
-for name, reference in (("rules", rules_app), ("rig", rig_app)):
+for name, reference in (("rules", rules_app), ("rig", rig_app), ("calibrate", calibrate_app)):
     app.add_typer(reference, name=name, result_callback=typer.echo)
 
 

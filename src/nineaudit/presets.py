@@ -212,7 +212,8 @@ noise = 0.3                     # acceleration unit; leave out to have it estima
 
 # The preset places the sensors. A [[sensor]] table of the same channel overrides what it states: range (full
 # scale), signal (column, Message.Signal or /topic:field; default: the channel's name), serial, position,
-# axis, gain, zero, alignment_deg, position_u, noise, timing_s. Other channels are added to the array.
+# axis, scale and offset (calibrated), gain, zero, alignment_deg, position_u, noise, timing_s. Other channels are added
+# to the array.
 {sensors}
 [[point]]                       # where results are wanted besides the origin
 name = "CG"

@@ -191,6 +191,10 @@ class SensorTable(Table):
     """Serial number."""
     sensitivity: Positive | None = None
     """mV per g_0 (accelerometers) or mV per deg/s (rate sensors); needed where the unit is mV."""
+    scale: Positive | None = None
+    """Calibrated sensitivity: reading over true value, both in the sensor's unit. Default: 1."""
+    offset: float | None = None
+    """Calibrated reading at a true value of 0, in the sensor's unit: true = (reading - offset) / scale. Default: 0."""
     gain: Deviation | None = None
     """Standard uncertainty of the sensitivity, relative."""
     zero: Deviation | None = None

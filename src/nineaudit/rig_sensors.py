@@ -127,7 +127,8 @@ def _sensor(entry: _Entry, tables: RigFile) -> Sensor:
     position = table.position or ([0.0, 0.0, 0.0] if is_rate else entry.need(None, "position"))
     length = factor(tables.units.length, "length")
     unit = tables.units.angular_rate if is_rate else tables.units.acceleration
-    to_si = _to_si(entry, kind, unit)
+    scale = _or(1.0, table.scale)
+    to_si = _to_si(entry, kind, unit) / scale
     zero = _first(table.zero, default.zero_rate if is_rate else None, default.zero)
     noise = _first(table.noise, default.noise_rate if is_rate else None, default.noise)
     position_u = _first(table.position_u, default.position)
@@ -139,6 +140,8 @@ def _sensor(entry: _Entry, tables: RigFile) -> Sensor:
         signal=table.signal or table.channel,
         unit=unit,
         to_si=to_si,
+        scale=scale,
+        offset=_or(0.0, table.offset) * to_si,
         full_scale=None if table.range is None else table.range * to_si,
         serial=table.serial,
         u_gain=_or(U_GAIN, table.gain, default.gain),
@@ -151,7 +154,7 @@ def _sensor(entry: _Entry, tables: RigFile) -> Sensor:
 
 
 def _to_si(entry: _Entry, kind: Kind, unit: str) -> float:
-    """SI value of one `unit` of a sensor's readings; mV through its sensitivity."""
+    """SI value of one `unit` of a sensor's readings as they are nominally; mV through its sensitivity."""
     if unit != "mV":
         return factor(unit, "angular_rate" if kind == "gyroscope" else "acceleration")
     advice = "readings in mV need it; or state another unit in [units]"

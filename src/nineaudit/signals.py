@@ -33,7 +33,8 @@ def can_origin(text: str) -> float:
 
 
 def si_factor(sensor: Sensor, unit: str | None) -> float:
-    """SI value of one unit of a signal: of the `unit` the recording states, else of the rig's.
+    """SI value of one unit of a signal: of the `unit` the recording states, else of the rig's; then over the
+    sensor's calibrated scale. What was read is value·si_factor − sensor.offset.
 
     A recording in the rig's own unit is scaled as the rig says (mV by its sensitivity).
     Raises ConfigurationError naming signal and unit when the unit is unknown or of another quantity.
@@ -41,19 +42,19 @@ def si_factor(sensor: Sensor, unit: str | None) -> float:
     stated = (unit or "").strip()
     if not stated or stated == sensor.unit:
         return sensor.to_si
-    return factor(stated, QUANTITY[sensor.kind], place=f"signal {sensor.signal}")
+    return factor(stated, QUANTITY[sensor.kind], place=f"signal {sensor.signal}") / sensor.scale
 
 
-def in_unit(values: FloatArray, scale: float) -> FloatArray:
-    """Numbers q with q·scale equal to `values` bit for bit, wherever the floats of a machine allow it.
+def in_unit(values: FloatArray, scale: float, offset: float = 0.0) -> FloatArray:
+    """Numbers q with q·scale − offset equal to `values` bit for bit, wherever the floats of a machine allow it.
 
     A quotient is rounded, and times `scale` it may miss by one unit in the last place; then a neighbour is taken
     that does not. Readings that came from a file (q·scale) are always met exactly; others to one such unit.
     """
-    quotient = np.asarray(values / scale, dtype=np.float64)
+    quotient = np.asarray((values + offset) / scale, dtype=np.float64)
     for towards in (np.inf, -np.inf):
         neighbour = np.nextafter(quotient, towards)
-        better = (quotient * scale != values) & (neighbour * scale == values)
+        better = (quotient * scale - offset != values) & (neighbour * scale - offset == values)
         quotient = np.where(better, neighbour, quotient)
     return quotient
 

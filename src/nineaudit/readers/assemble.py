@@ -66,8 +66,9 @@ def _origin(traces: Sequence[Trace]) -> tuple[float, tuple[str, ...]]:
 
 
 def _in_si(trace: Trace, rig: Rig, origin: float) -> Trace:
-    factor = si_factor(rig.array[trace.channel], trace.unit)
-    values = np.where(np.isfinite(trace.values), trace.values * factor, np.nan)
+    sensor = rig.array[trace.channel]
+    factor = si_factor(sensor, trace.unit)
+    values = np.where(np.isfinite(trace.values), trace.values * factor - sensor.offset, np.nan)
     return replace(trace, time=frozen(trace.time - origin), values=frozen(values))
 
 

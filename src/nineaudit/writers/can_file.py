@@ -92,7 +92,7 @@ def _encode(recording: Recording, readings: FloatArray, dbc: Sequence[Path]) -> 
     blocks: dict[int, list[tuple[Sensor, BusSignal, FloatArray]]] = {}
     for sensor, column in zip(recording.rig.array.sensors, readings.T, strict=True):
         signal = can_database.find_signal(messages, sensor.signal)
-        values = column / si_factor(sensor, signal.signal.unit)
+        values = (column + sensor.offset) / si_factor(sensor, signal.signal.unit)
         _require_room(signal, values, recording.time)
         blocks.setdefault(signal.key, []).append((sensor, signal, values))
     frames, error, notes = [], dict[str, float](), list[str]()

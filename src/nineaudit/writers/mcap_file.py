@@ -55,7 +55,7 @@ def _topics(recording: Recording, readings: FloatArray) -> dict[str, dict[tuple[
     for sensor, column in zip(rig.array.sensors, readings.T, strict=True):
         topic, colon, name = sensor.signal.partition(":")
         place = (topic, tuple(name.split("."))) if colon else (TOPIC, (sensor.signal,))
-        topics.setdefault(place[0], {})[place[1]] = in_unit(column, sensor.to_si).tolist()
+        topics.setdefault(place[0], {})[place[1]] = in_unit(column, sensor.to_si, sensor.offset).tolist()
     owner, _, name = (rig.time_signal or "").rpartition(":")
     for topic, fields in topics.items():
         if name and owner in ("", topic):

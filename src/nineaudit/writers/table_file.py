@@ -61,5 +61,5 @@ def _columns(recording: Recording, readings: FloatArray) -> tuple[list[str], lis
     name = rig.time_signal or TIME
     columns = {name: in_unit(recording.time, factor(time_unit(name, rig.time_unit) or "s", "time"))}
     for sensor, column in zip(rig.array.sensors, readings.T, strict=True):
-        columns[sensor.signal] = in_unit(column, sensor.to_si)
+        columns[sensor.signal] = in_unit(column, sensor.to_si, sensor.offset)
     return list(columns), list(columns.values())
