@@ -105,3 +105,72 @@ def test_unknown_standard_and_class_are_refused() -> None:
         filters.coefficients(180, 10_000, "DIN")  # type: ignore[arg-type]
     with pytest.raises(ConfigurationError, match="channel frequency class"):
         filters.coefficients(float("nan"), 10_000)
+
+
+# --- every class of both standards, and filtering once ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("standard", ["J211", "ISO6487"])
+@pytest.mark.parametrize("class_", filters.CLASSES)
+@pytest.mark.parametrize("rate", [10_000.0, 20_000.0, 100_000.0])
+def test_corner_is_where_both_passes_leave_3_db(class_: float, rate: float, standard: filters.Standard) -> None:
+    corner = filters.corner(class_, rate, standard)
+    assert filters.response(np.array([corner]), class_, rate, standard)[0] == pytest.approx(np.sqrt(0.5), rel=1e-9)
+    # 5/3 of the class, a third of a per cent wider by ISO 6487, as the sampling grows fast
+    design = {"J211": 2.0775, "ISO6487": 1.25 * 5 / 3}[standard] * (np.sqrt(2) - 1) ** 0.25
+    bent = (np.pi * corner / rate) ** 2 / 2.0
+    assert corner / class_ == pytest.approx(design, rel=bent)
+
+
+@pytest.mark.parametrize("class_", filters.CLASSES)
+def test_padding_is_that_of_both_standards_for_every_class(class_: float) -> None:
+    """A straight line that starts high passes to its last sample, but for what is left after 10 ms of padding of the
+    lag √2/ωd with which the filter starts: e^(−ωd 10 ms/√2), seen for CFC60 only."""
+    line, pole = 40.0 + np.linspace(0.0, 30.0, 3000), np.sqrt(2.0) * np.pi * class_ * 2.0775
+    left = 30.0 / 0.15 / pole * np.exp(-pole * 0.010) + 1e-9
+    for standard in ("J211", "ISO6487"):
+        np.testing.assert_allclose(filters.cfc(line, 20_000.0, class_, standard), line, atol=left, rtol=0.0)
+
+
+def noise_at_rest(class_: float | None, rate: float = 10_000.0, samples: int = 400, seed: int = 5) -> FloatArray:
+    white = np.random.default_rng(seed).normal(0.0, 3.0, (samples + 4000, 9))
+    return (white if class_ is None else filters.cfc(white, rate, class_))[2000 : 2000 + samples]
+
+
+@pytest.mark.parametrize("class_", [None, 180.0, 600.0, 1000.0])
+@pytest.mark.parametrize("seed", range(20))
+def test_noise_shows_the_class_of_its_filter(class_: float | None, seed: int) -> None:
+    assert filters.class_of_noise(noise_at_rest(class_, seed=seed), 10_000.0) == class_
+
+
+@pytest.mark.parametrize("rate", [10_000.0, 20_000.0])
+def test_noise_that_was_filtered_and_then_rounded_shows_its_class(rate: float) -> None:
+    """A converter's step of a sixth of the noise before the filter adds white noise of 0.05 of it."""
+    rounded = np.round(noise_at_rest(1000.0, rate, 800) / 0.5) * 0.5
+    assert filters.class_of_noise(rounded, rate) == 1000.0
+
+
+def test_noise_says_nothing_where_it_is_short_constant_or_slowly_sampled() -> None:
+    assert filters.class_of_noise(noise_at_rest(1000.0, samples=3), 10_000.0) is None
+    assert filters.class_of_noise(np.zeros((400, 9)), 10_000.0) is None
+    assert filters.class_of_noise(np.full((400, 9), np.nan), 10_000.0) is None
+    assert filters.class_of_noise(noise_at_rest(None), 500.0) is None
+    assert filters.class_of_noise(noise_at_rest(60.0, samples=200), 10_000.0) != 60.0  # two periods of 100 Hz
+
+
+def test_a_recording_is_not_filtered_twice() -> None:
+    """−6.0 dB at the corner of one class twice; from CFC1000 to CFC600 0.5 dB are lost, which is let pass."""
+    values = noise_at_rest(None)
+    for class_ in (180.0, 1000.0):
+        with pytest.raises(ConfigurationError, match=r"filtered twice.*−6\.0 dB"):
+            filters.once(values, 10_000.0, class_, already=class_)
+    with pytest.raises(ConfigurationError, match="filtered twice"):
+        filters.once(values, 10_000.0, 1000.0, already=180.0)
+    for class_, already in ((1000.0, None), (180.0, 1000.0), (600.0, 1000.0)):
+        expected = filters.cfc(values, 10_000.0, class_)
+        np.testing.assert_array_equal(filters.once(values, 10_000.0, class_, already), expected)
+
+
+def test_filtering_once_keeps_the_guard_against_slow_sampling() -> None:
+    with pytest.raises(EstimationError, match="sampled too slowly"):
+        filters.once(noise_at_rest(None), 9_000.0, 1000.0, already=None)

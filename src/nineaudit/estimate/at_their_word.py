@@ -14,6 +14,7 @@ standard deviation, which changes a channel's readings by the column D (n,), the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -53,11 +54,10 @@ class Word:
 
     def coefficients(self, gradient: Gradient) -> FloatArray:
         """(n,k) what one unit of each reading adds to an output with this gradient."""
-        positions, axes = self.array.positions, self.array.axes * self.array.is_accelerometer[:, None]
-        felt = rigid_body.centripetal_jacobian(positions, axes, self.motion.omega)
+        felt, lever = self._felt
         by_a0 = gradient.a0 @ self.a0_rows
         by_omega = gradient.omega - np.einsum("nk,nkj->nj", by_a0, felt)
-        by_alpha = gradient.alpha - by_a0 @ np.cross(positions, axes)
+        by_alpha = gradient.alpha - by_a0 @ lever
         out = by_a0
         if self.slope is None:
             direct = by_alpha @ self.alpha_rows
@@ -70,10 +70,16 @@ class Word:
             by_omega = self.in_time.T @ by_omega
         return np.asarray(out + by_omega @ self.omega_rows)
 
+    @cached_property
+    def _felt(self) -> tuple[FloatArray, FloatArray]:
+        """∂q/∂ω (n,k,3) and r × n (k,3), 0 for rate sensors."""
+        positions, axes = self.array.positions, self.array.axes * self.array.is_accelerometer[:, None]
+        return rigid_body.centripetal_jacobian(positions, axes, self.motion.omega), np.cross(positions, axes)
+
     def rows(self, gradient: Gradient) -> dict[str, float]:
         """Standard uncertainty of an output with this gradient, by source."""
         by_reading = self.coefficients(gradient)
-        parts = np.einsum("nk,knp->kp", by_reading, self.columns)
+        parts = np.matmul(by_reading.T[:, None, :], self.columns)[:, 0]
         out = {
             source: float(np.linalg.norm(parts[:, [calibration.PARAMETERS.index(m) for m in members]]))
             for source, members in SOURCES.items()
