@@ -113,7 +113,7 @@ class Sensitivity:
         if not self.determined:
             raise EstimationError(
                 "cross-axis sensitivity cannot be told from this motion",
-                found=f"rank {self.coupling_rank} of {len(_ENTRIES)}; channel by channel {self.rank} of {self.unknowns}",
+                found=f"rank {self.coupling_rank} of {len(_ENTRIES)}, by channel {self.rank} of {self.unknowns}",
                 expected="full rank",
                 advice="record a general three-dimensional motion, or calibrate the sensors on a rate table",
             )
@@ -128,7 +128,7 @@ def fit_sensitivity(data: Data, prior: float = WIDE) -> Sensitivity:
     tilts = B c, to six numbers. EstimationError where ω is not determined.
     """
     sds = data.prior_sd.copy()
-    sds[np.ix_(data.array.is_accelerometer, _TILTS)] = prior
+    sds[np.ix_(np.flatnonzero(data.array.is_accelerometer), np.array(_TILTS))] = prior
     found = healthy_fit(replace(data, prior_sd=sds))
     covariance = posterior(found).theta
     channel, parameter = found.data.active

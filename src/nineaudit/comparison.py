@@ -1,0 +1,261 @@
+"""Every scheme that a recording's sensors allow, side by side, as Martin98 compares his: curves, correlation, ISO 18571
+rating, and differences against what the rig's uncertainties explain.
+
+The budget of a difference is its standard deviation over draws of the instrument (JCGM 101): every draw changes all
+readings by the calibration errors of calibration.columns, one standard deviation of each as the rig states it, and by
+noise, and every scheme runs on the same draw. So an error that two schemes share does not count between them.
+
+    ratio = rms(curve − reference) / rms(u of the difference),   explained where ratio ≤ k = 2
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from nineaudit.array import FloatArray, SensorArray
+from nineaudit.case import Case
+from nineaudit.errors import ConfigurationError, EstimationError
+from nineaudit.estimate import calibration
+from nineaudit.estimate.motion import Motion, bridge, estimate_motion, has_rates
+from nineaudit.estimate.trajectory import Fit, fit
+from nineaudit.physics import rigid_body
+from nineaudit.rig import Point
+from nineaudit.schemes import martin, ninacc, rating, rgla, takhounts
+
+DRAWS: Final = 16
+"""Draws of the instrument: the standard deviation of a budget is known to 1/√(2·15), 18 %."""
+EXPLAINED: Final = 2.0
+SEED: Final = 1998
+Curves = Mapping[str, FloatArray]
+Scheme = Callable[[FloatArray], Motion]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One curve of one scheme against the reference. SI `unit`.
+
+    `pearson` correlation; `lowest` of its moving window of 2.5 ms where the reference is above a tenth of its peak
+    (NaN where no window holds enough samples); `rating` None where the curve is flat; `peak` of the reference;
+    `difference` largest; `u` rms standard uncertainty of the difference; `ratio` of the rms difference to it.
+    """
+
+    scheme: str
+    quantity: str
+    axis: str
+    unit: str
+    pearson: float
+    lowest: float
+    rating: rating.Rating | None
+    peak: float
+    difference: float
+    u: float
+    ratio: float
+
+    @property
+    def explained(self) -> bool:
+        """Whether the budget explains the difference."""
+        return self.ratio <= EXPLAINED
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """`curves` by scheme and quantity, each (m,3) SI on `time` (m,) s; `methods` in words; `rows` against
+    `reference`; `refused` schemes with the reason. `draws` of the instrument behind the budgets."""
+
+    time: FloatArray
+    reference: str
+    methods: Mapping[str, str]
+    curves: Mapping[str, Curves]
+    rows: tuple[Row, ...]
+    refused: Mapping[str, str]
+    draws: int
+
+
+def compare(case: Case, reference: str | None = None, draws: int = DRAWS, seed: int = SEED) -> Comparison:
+    """Run every scheme on the block means of `case` and compare each with `reference`, by default the whole-record fit,
+    or else the first that runs.
+
+    Raises ConfigurationError for a reference that is no scheme or does not run, or fewer than two draws;
+    EstimationError where fewer than two schemes run.
+    """
+    if draws < 2:
+        raise ConfigurationError("too few draws", place="--draws", found=draws, expected="2 or more")
+    schemes, readings = _schemes(case), bridge(case.condensed.readings, case.condensed.time)
+    motions, refused = _run(schemes, readings)
+    chosen = _reference(reference, tuple(schemes), motions, refused)
+    points = case.recording.rig.points
+    curves = {name: outputs(motion, points) for name, motion in motions.items()}
+    sample = _drawn(case, {name: schemes[name] for name in motions}, motions[chosen], readings, draws, seed)
+    spread = [{name: outputs(m, points) for name, m in drawn.items()} for drawn in sample]
+    rows = [
+        _row(name, quantity, axis, case.condensed.time, curves, chosen, spread)
+        for name in curves
+        if name != chosen
+        for quantity in curves[name]
+        for axis in range(3)
+    ]
+    methods = {name: motion.method for name, motion in motions.items()}
+    return Comparison(case.condensed.time, chosen, methods, curves, tuple(rows), refused, len(spread))
+
+
+def outputs(motion: Motion, points: tuple[Point, ...]) -> dict[str, FloatArray]:
+    """α, ω, a at the origin and at every point, each (n,3) SI."""
+    at = {f"a({p.name})": rigid_body.acceleration_at(p.position, motion.a0, motion.alpha, motion.omega) for p in points}
+    return {"alpha": motion.alpha, "omega": motion.omega, "a0": motion.a0, **at}
+
+
+def unit_of(quantity: str) -> str:
+    """SI unit of a quantity of `outputs`."""
+    return {"alpha": "rad/s^2", "omega": "rad/s"}.get(quantity, "m/s^2")
+
+
+def _schemes(case: Case) -> dict[str, Scheme]:
+    """Schemes by name: readings (m,k) of the blocks to a motion; each refuses with an EstimationError."""
+    blocks, array = case.condensed, case.array
+    time, sigma = blocks.time, blocks.sigma
+    fitted: list[Fit] = []
+
+    def by_map(readings: FloatArray) -> Motion:
+        data = replace(case.fit_data, readings=readings)
+        fitted.append(fit(data, fitted[0].omega, fitted[0].theta) if fitted else case.healthy)
+        return fitted[-1].motion
+
+    def by_fit_at_its_word(readings: FloatArray) -> Motion:
+        return takhounts.optimise(replace(case.fit_data, readings=readings)).motion
+
+    def by_padgaonkar(readings: FloatArray) -> Motion:
+        held = _accelerometers(array)
+        chosen = array.select(held)
+        return estimate_motion(chosen, time, readings[:, held], sigma[held], _rest(case))
+
+    def by_rates(readings: FloatArray) -> Motion:
+        if not has_rates(array):
+            raise EstimationError("no rate sensors on three axes")
+        return estimate_motion(array, time, readings, sigma)
+
+    def by_ninacc(readings: FloatArray) -> Motion:
+        start = _rest(case)
+        found = ninacc.forward(array, time[start:], readings[start:], np.zeros(3), sigma[_accelerometers(array)] ** 2)
+        return _from(found, start)
+
+    return {
+        "map": by_map,
+        "optimised": by_fit_at_its_word,
+        "product-free": by_padgaonkar,
+        "ninacc": by_ninacc,
+        "rates": by_rates,
+        "periphery": lambda y: martin.periphery(array, time, y, sigma),
+        "co-planar": lambda y: martin.coplanar(array, time, y, sigma),
+        "compact-cube": lambda y: martin.compact_cube(array, time, y, sigma),
+        "rgla": lambda y: rgla.motion(array, time, y, sigma),
+    }
+
+
+def _accelerometers(array: SensorArray) -> list[int]:
+    return [int(i) for i in np.flatnonzero(array.is_accelerometer)]
+
+
+def _rest(case: Case) -> int:
+    """Block at which the rest begins. EstimationError where there is none."""
+    return case.required_rest.start // case.condensed.length
+
+
+def _from(motion: Motion, start: int) -> Motion:
+    """The motion with what lies before `start` at rest."""
+    if start == 0:
+        return motion
+    still = np.zeros((start, 3))
+    a0 = np.vstack([np.tile(motion.a0[:1], (start, 1)), motion.a0])
+    return Motion(np.vstack([still, motion.omega]), np.vstack([still, motion.alpha]), a0, motion.method)
+
+
+def _run(schemes: Mapping[str, Scheme], readings: FloatArray) -> tuple[dict[str, Motion], dict[str, str]]:
+    motions, refused = {}, {}
+    for name, scheme in schemes.items():
+        try:
+            found = scheme(readings)
+        except EstimationError as error:
+            refused[name] = str(error)
+            continue
+        if all(np.isfinite(v).all() for v in (found.omega, found.alpha, found.a0)):
+            motions[name] = found
+        else:
+            refused[name] = "the sensors do not tell all of ω, α and a0"
+    return motions, refused
+
+
+def _reference(
+    wanted: str | None, known: tuple[str, ...], motions: Mapping[str, Motion], refused: Mapping[str, str]
+) -> str:
+    if wanted is not None and wanted not in known:
+        raise ConfigurationError(
+            "no such scheme", place="--reference", found=wanted, expected="one of " + ", ".join(known)
+        )
+    if wanted is not None and wanted in refused:
+        raise ConfigurationError(f"the scheme cannot run: {refused[wanted]}", place="--reference", found=wanted)
+    if len(motions) < 2:
+        first = "; ".join(f"{name}: {why}" for name, why in refused.items())
+        raise EstimationError("fewer than two schemes can run", found=list(motions), expected="two", advice=first)
+    return wanted or next(iter(motions))
+
+
+def _drawn(
+    case: Case, schemes: Mapping[str, Scheme], motion: Motion, readings: FloatArray, draws: int, seed: int
+) -> list[dict[str, Motion]]:
+    """Motions by scheme for each draw of calibration errors and noise added to the readings; a draw in which a scheme
+    fails is left out for all."""
+    columns = calibration.all_columns(case.array, readings, case.condensed.time, motion)
+    rng = np.random.default_rng(seed)
+    out = []
+    for _ in range(draws):
+        errors = np.einsum("knp,kp->nk", columns, rng.standard_normal((len(case.array), columns.shape[2])))
+        noise = rng.standard_normal(readings.shape) * case.condensed.sigma
+        found, failed = _run(schemes, readings + errors + noise)
+        if not failed:
+            out.append(found)
+    if len(out) < 2:
+        raise EstimationError("the schemes fail on readings changed within the rig's uncertainties", found=len(out))
+    return out
+
+
+def _row(
+    name: str,
+    quantity: str,
+    axis: int,
+    time: FloatArray,
+    curves: Mapping[str, Curves],
+    reference: str,
+    spread: list[dict[str, dict[str, FloatArray]]],
+) -> Row:
+    curve, against = (curves[n][quantity][:, axis] for n in (name, reference))
+    shift = np.stack([(s[name][quantity] - s[reference][quantity])[:, axis] for s in spread]) - (curve - against)
+    u = float(np.sqrt((shift**2).mean()))
+    rms = float(np.sqrt(((curve - against) ** 2).mean()))
+    flat = not (np.ptp(curve) > 0.0 and np.ptp(against) > 0.0)
+    return Row(
+        scheme=name,
+        quantity=quantity,
+        axis="xyz"[axis],
+        unit=unit_of(quantity),
+        pearson=float("nan") if flat else float(np.corrcoef(curve, against)[0, 1]),
+        lowest=_lowest(curve, against, time),
+        rating=None if flat else rating.rate(curve, against),
+        peak=float(np.abs(against).max()),
+        difference=float(np.abs(curve - against).max()),
+        u=u,
+        ratio=rms / u if u > 0.0 else (0.0 if rms == 0.0 else float("inf")),
+    )
+
+
+def _lowest(curve: FloatArray, against: FloatArray, time: FloatArray) -> float:
+    """Lowest moving correlation where the reference is above a tenth of its peak; NaN where there is none."""
+    per_second = (len(time) - 1) / float(time[-1] - time[0])
+    if round(martin.WINDOW * per_second / 2.0) < 1:
+        return float("nan")
+    moving = martin.moving_correlation(curve, against, per_second)
+    told = np.isfinite(moving) & (np.abs(against) > 0.1 * np.abs(against).max())
+    return float(moving[told].min()) if told.any() else float("nan")
