@@ -165,6 +165,25 @@ def report(
     _print([str(html)])
 
 
+@app.command(epilog=example("nineaudit compare T0001.csv --rig rig.toml --html schemes.html"))
+def compare(
+    recording: Recording,
+    rig: RigOption,
+    reference: Annotated[str | None, typer.Option(metavar="SCHEME", help="Default: map, the whole-record fit.")] = None,
+    draws: Annotated[int, typer.Option(help="Of the instrument, for the budgets of the differences.")] = 16,
+    dbc: Dbc = None,
+    html: Annotated[Path | None, typer.Option(metavar="F", help="Write the page with the curves.")] = None,
+) -> None:
+    """Run every scheme that the sensors allow and compare α, ω and the acceleration of every point."""
+    from nineaudit import commands
+    from nineaudit.outputs import protect
+    from nineaudit.rig import load_rig
+
+    instrument = load_rig(rig)
+    protect([html], [recording, rig, *(dbc or instrument.dbc)])
+    _print(commands.compared(recording, instrument, reference, draws=draws, dbc=dbc or (), html=html))
+
+
 @app.command(epilog=example("nineaudit demo"))
 def demo(
     output: Annotated[
