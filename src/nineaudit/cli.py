@@ -10,14 +10,15 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
-from typing import Annotated, NoReturn, TypeVar
+from typing import Annotated, NoReturn, ParamSpec, TypeVar
 
 import typer
 
+from nineaudit import motion_command
 from nineaudit.calibrate import calibrate_app
 from nineaudit.errors import NineauditError
 from nineaudit.options import Dbc, Force, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
@@ -29,6 +30,7 @@ DEFECT = 70
 FailOn = StrEnum("FailOn", ["error", "warning", "never"])
 Format = StrEnum("Format", ["text", "json", "jsonl", "junit", "github"])
 T = TypeVar("T")
+P = ParamSpec("P")
 
 app = group(pretty_exceptions_enable=False)
 
@@ -230,6 +232,20 @@ def selftest(
     _print(said)
     raise typer.Exit(0 if passed else 1)
 
+
+def _printing(command: Callable[P, tuple[list[str], int]]) -> Callable[P, None]:
+    """A command that returns its lines and its exit code, as one that prints them and exits."""
+
+    @wraps(command)
+    def run(*arguments: P.args, **options: P.kwargs) -> None:
+        lines, code = command(*arguments, **options)
+        _print(lines)
+        raise typer.Exit(code)
+
+    return run
+
+
+app.command("motion", epilog=motion_command.EXAMPLE)(_printing(motion_command.motion))
 
 for name, reference in (("rules", rules_app), ("rig", rig_app), ("calibrate", calibrate_app)):
     app.add_typer(reference, name=name, result_callback=typer.echo)

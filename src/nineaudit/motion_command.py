@@ -1,0 +1,185 @@
+"""The command `motion`: what the body did, by a method, as a summary, a file and a page. It returns what to print."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nineaudit.errors import ConfigurationError
+from nineaudit.options import Dbc, Force, Recording, RigOption, example
+
+if TYPE_CHECKING:
+    from nineaudit.case import Case
+    from nineaudit.motion import Kinematics, Start
+    from nineaudit.rig import Point, Rig
+
+EXAMPLE = example(
+    "nineaudit motion healthy.csv --rig rig.toml --point 10,0,-5 --output motion.csv",
+)
+
+Triple = tuple[float, float, float]
+
+
+def motion(
+    recording: Recording,
+    rig: RigOption,
+    point: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[NAME=]X,Y,Z", help="In the rig's length unit, in place of its points; may be repeated."),
+    ] = None,
+    method: Annotated[str, typer.Option(metavar="NAME", help="map, padgaonkar, ninacc, product-free, rates.")] = "map",
+    output: Annotated[
+        Path | None, typer.Option(metavar="F", help="All curves: .csv, .parquet, or .mcap with poses.")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(metavar="F", help="A page with plots.")] = None,
+    omega: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="ω at the first sample, rad/s, if not 0.")] = None,
+    angles: Annotated[str, typer.Option(metavar="Y,P,R", help="Yaw, pitch, roll at first, degrees.")] = "0,0,0",
+    velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m/s.")] = "0,0,0",
+    position: Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m.")] = "0,0,0",
+    gravity: Annotated[
+        bool, typer.Option("--gravity", help="The sensors feel gravity (laboratory +z): put it right by the attitude.")
+    ] = False,
+    check_triax: Annotated[
+        str | None,
+        typer.Option(metavar="PREFIX", help="Predict this extra triax from the others; HIC, GSI deviations."),
+    ] = None,
+    dbc: Dbc = None,
+    force: Force = False,
+) -> tuple[list[str], int]:
+    """Motion of the body: ω, α, attitude; acceleration, velocity, position of points; HIC, GSI, a3ms, BrIC with their
+    uncertainty.
+
+    Exit code 1: the triax of --check-triax deviates by more than in the paper (HIC 0.29 %, GSI 0.80 %, Alem 1977) and
+    than the stated uncertainties explain.
+    """
+    from nineaudit.case import Case
+    from nineaudit.motion import motion_of
+    from nineaudit.motion_files import writer_of
+    from nineaudit.motion_methods import method_named
+    from nineaudit.outputs import protect, require_absent
+    from nineaudit.readers import read
+    from nineaudit.rig import load_rig
+
+    method_named(method)
+    instrument = load_rig(rig)
+    protect([output, html], [recording, rig, *(dbc or instrument.dbc)])
+    if output is not None:
+        writer_of(output)
+        require_absent(output, force)
+    instrument = with_points(instrument, point or [])
+    start = _start(omega, angles, velocity, position, gravity)
+    case = Case(read(recording, instrument, dbc=dbc or ()))
+    found = motion_of(case, method, start)
+    lines = [*summary(found, instrument, recording.name), *_written(found, instrument, recording, output, html, force)]
+    if check_triax is None:
+        return lines, 0
+    said, passed = _triax_lines(case, check_triax, method, start)
+    return [*lines, *said], 0 if passed else 1
+
+
+def with_points(rig: Rig, texts: list[str]) -> Rig:
+    """The rig with the points that `texts` ([NAME=]x,y,z, in its length unit) name, in place of its own if any.
+
+    ConfigurationError where one is no three numbers, or two have one name.
+    """
+    import numpy as np
+
+    from nineaudit.rig import Point
+    from nineaudit.units import factor
+
+    points: list[Point] = []
+    for i, text in enumerate(texts, 1):
+        name, _, numbers = text.rpartition("=")
+        place = np.array(_triple(numbers, "--point")) * factor(rig.units.length, "length")
+        points.append(Point(name or ("point" if len(texts) == 1 else f"point {i}"), place))
+    if len({p.name for p in points}) < len(points):
+        raise ConfigurationError("two points of one name", place="--point", found=[p.name for p in points])
+    return replace(rig, points=tuple(points)) if points else rig
+
+
+def summary(found: Kinematics, rig: Rig, name: str) -> list[str]:
+    """What was found, in the rig's units: peaks, injury values with their standard uncertainty, and how far it went."""
+    import numpy as np
+
+    from nineaudit.report.numbers import digits, edge, quantity, spelled
+
+    rate = (len(found.time) - 1) / (found.time[-1] - found.time[0])
+    span = f"{found.time[0]:.4g} to {found.time[-1]:.4g} s, {len(found.time)} samples at {digits(float(rate))} Hz"
+    lines = [f"{name}: {span}; {found.method}"]
+    width = max(map(len, found.values))
+    for label, value in found.values.items():
+        unit, one = edge(value.unit, rig)
+        u = "" if value.u is None else f"  u {digits(value.u / one, 2)}"
+        lines.append(f"  {label:<{width}}  {digits(value.value / one, 4)} {spelled(unit)}".rstrip() + u)
+    largest = zip(("yaw", "pitch", "roll"), np.degrees(np.abs(found.euler).max(axis=0)), strict=True)
+    lines.append("  largest angles: " + ", ".join(f"{axis} {angle:.3g}°" for axis, angle in largest))
+    unit, one = edge("m", rig)
+    for point, path in found.paths.items():
+        fastest = float(np.linalg.norm(path.v, axis=1).max())
+        farthest = float(np.linalg.norm(path.x - path.x[0], axis=1).max()) / one
+        reach = f"{quantity(fastest, 'm/s')}, {quantity(farthest, unit)} from its start"
+        lines.append(f"  {point} in the laboratory: at most {reach}")
+    return [*lines, *(f"  note: {note}" for note in found.notes)]
+
+
+def _triax_lines(case: Case, prefix: str, method: str, start: Start) -> tuple[list[str], bool]:
+    from nineaudit.finding import Verdict
+    from nineaudit.motion_triax import check_triax
+    from nineaudit.report.numbers import digits
+
+    found = check_triax(case, prefix, method, start)
+    lines = [f"triax {', '.join(found.channels)} as the other channels predict it, against measured:"]
+    for one in found.judged:
+        expanded = "U not known" if one.U is None else f"U {digits(100 * one.U, 2)} %, k=2"
+        pair = f"{digits(one.predicted, 4)} against {digits(one.measured, 4)}, {100 * one.deviation:+.2f} %"
+        lines.append(f"  {one.name} {pair} ({expanded}); {100 * one.tolerance:.2f} % in the paper: {one.verdict}")
+    lines.append(f"  largest difference of acceleration {100 * found.worst:.2g} % of the peak")
+    return lines, all(one.verdict is not Verdict.FAIL for one in found.judged)
+
+
+def _written(
+    found: Kinematics, rig: Rig, recording: Path, output: Path | None, html: Path | None, force: bool
+) -> list[str]:
+    said = []
+    if output is not None:
+        from nineaudit.motion_files import write_motion
+
+        write_motion(found, output, force)
+        said.append(f"{output}: {len(found.time)} samples of every curve, SI units")
+    if html is not None:
+        from nineaudit.outputs import write_text
+        from nineaudit.report.motion_page import render_motion
+
+        write_text(html, render_motion(found, rig, recording.name))
+        said.append(f"{html}: values and plots")
+    return said
+
+
+def _start(omega: str | None, angles: str, velocity: str, position: str, gravity: bool) -> Start:
+    import math
+
+    from nineaudit.motion import Start
+
+    yaw, pitch, roll = _triple(angles, "--angles")
+    return Start(
+        omega=None if omega is None else _triple(omega, "--omega"),
+        euler=(math.radians(yaw), math.radians(pitch), math.radians(roll)),
+        velocity=_triple(velocity, "--velocity"),
+        position=_triple(position, "--position"),
+        gravity=gravity,
+    )
+
+
+def _triple(text: str, option: str) -> Triple:
+    """Three finite numbers with commas between them. ConfigurationError where they are not."""
+    import math
+
+    from nineaudit.commands import numbers
+
+    found = numbers(text, option) or []
+    if len(found) != 3 or not all(map(math.isfinite, found)):
+        raise ConfigurationError("not three numbers", place=option, found=text, expected="x,y,z")
+    return found[0], found[1], found[2]
