@@ -152,6 +152,16 @@ def test_beyond_a_quarter_turn_there_is_a_warning(axis: int) -> None:
     assert f"grew up to {found.growth:.1f} times" in found.warning
 
 
+def test_the_warning_goes_with_the_motion() -> None:
+    array = parse_rig(preset_text("3-2-1")).array
+    for degrees in (60.0, 120.0):
+        truth = turn(0, math.radians(degrees))
+        ideal = Package(array.positions, array.axes, np.zeros(6))
+        found, how_far = growth.motion(array, truth.time, outputs(ideal, truth), np.zeros(3))
+        np.testing.assert_allclose(found.omega, truth.omega, atol=1e-6 * np.abs(truth.omega).max())
+        assert ("about a quarter turn" in found.method) == (degrees > 90.0) == (how_far.warning is not None)
+
+
 def test_a_turn_and_its_return_is_as_good_as_its_largest_angle() -> None:
     out = turn(0, math.radians(80.0))
     both = Truth(

@@ -130,6 +130,7 @@ def staircase(
 
     _require_limits(reference_u, confidence)
     instrument, sheet = load_rig(rig), read_sheet(runs)
+    _require_new(instrument, sheet)
     level = numbers(sheet, "level")
     found, absent = readings(sheet, instrument.array, ("level",))
     gains = [path.staircase(instrument.array[channel], level, values) for channel, values in found.items()]
@@ -197,6 +198,18 @@ def _written(
     ]
     write_text(output, calibrated(rig, changes, notes, output))
     return [f"{output}: the rig with {len(changes)} of {len(rig.array)} channels calibrated"]
+
+
+def _require_new(rig: Rig, sheet: Sheet) -> None:
+    """ConfigurationError where the rig file says that this staircase is in it: it would be put behind itself."""
+    if sheet.sha256 in rig.text:
+        raise ConfigurationError(
+            "this staircase is in the rig file already",
+            file=rig.path,
+            found=sheet.path.name,
+            expected="a rig file from before it",
+            advice="a path's gain is put behind the sensor's scale: once",
+        )
 
 
 def _left(channels: Sequence[str]) -> list[str]:

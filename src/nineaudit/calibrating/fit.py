@@ -17,6 +17,8 @@ from nineaudit.array import FloatArray, Kind, Sensor
 from nineaudit.calibrating.sheet import unit_si
 from nineaudit.errors import EstimationError
 
+_LEAST_SCALE = 1e-6
+"""Of a connected sensor: a millionth of what the rig says."""
 WORST_CONDITION = 1000.0
 """Largest ratio of the best to the worst varied direction of the input: beyond, a direction counts as not varied."""
 
@@ -118,7 +120,7 @@ def fit(sensor: Sensor, felt: FloatArray, readings: FloatArray, *, single: bool 
 
 def _require_signal(sensor: Sensor, scale: float, line: Line) -> None:
     """EstimationError where the readings do not follow the input at all."""
-    if not scale > 3.0 * math.sqrt(float(np.diag(line.covariance)[:-1].max())):
+    if not scale > _LEAST_SCALE + 3.0 * math.sqrt(float(np.diag(line.covariance)[:-1].max())):
         raise EstimationError(
             "the readings do not follow the input",
             place=f"channel {sensor.channel}",

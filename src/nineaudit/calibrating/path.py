@@ -59,7 +59,7 @@ def staircase(sensor: Sensor, level: FloatArray, readings: FloatArray) -> PathGa
         )
     line = least_squares(steps[:, None], values)
     gain, u_gain = float(line.x[0]), math.sqrt(float(line.covariance[0, 0]))
-    if not gain > 3.0 * u_gain:
+    if not gain > 1e-6 + 3.0 * u_gain:
         raise EstimationError(
             "the path does not follow the staircase",
             place=f"channel {sensor.channel}",

@@ -17,11 +17,12 @@ from typing import Final
 
 import numpy as np
 
-from nineaudit.array import FloatArray
+from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
+from nineaudit.estimate.motion import Motion
 from nineaudit.physics import rigid_body
 from nineaudit.physics.kinematics import orientation
-from nineaudit.schemes.six_accelerometers import Solution, inverse
+from nineaudit.schemes.six_accelerometers import Solution, inverse, package, solve
 
 QUARTER_TURN: Final = math.pi / 2
 LARGEST_GROWTH: Final = math.exp(QUARTER_TURN)
@@ -120,6 +121,20 @@ def _jacobian(solution: Solution) -> FloatArray:
     six = solution.package
     slope = rigid_body.centripetal_jacobian(six.positions, six.sensitivity, solution.omega)
     return np.asarray(-inverse(six)[3:] @ slope)
+
+
+def motion(array: SensorArray, time: FloatArray, readings: FloatArray, initial: FloatArray) -> tuple[Motion, Validity]:
+    """The motion of a rig with six accelerometers from its `readings` (n,k) SI, ω = `initial` (3,) at the first sample,
+    and what the scheme's rotation and growth make of it; its warning is in the motion's `method` too.
+
+    Raises EstimationError as six_accelerometers.package and solve.
+    """
+    six = package(array)
+    solution = solve(six, readings[:, array.is_accelerometer], time, initial)
+    found = validity(solution)
+    method = "six accelerometers, ω fed back step by step"
+    said = f"{method}; {found.warning}" if found.warning else method
+    return Motion(solution.omega, solution.alpha, solution.a0, said), found
 
 
 def validity(solution: Solution) -> Validity:
