@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from nineaudit.array import FloatArray, Sensor, SensorArray
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.physics import kinematics, laboratory, rigid_body
-from nineaudit.schemes import extra_triax, ninacc
+from nineaudit.schemes import extra_triax, growth, ninacc
 from nineaudit.selftest import alem77
 from nineaudit.simulate.published import alem, alem_path
 from nineaudit.simulate.truth import Truth
@@ -70,7 +70,8 @@ def test_the_predictor_corrector_is_of_fourth_order() -> None:
 
 def test_an_error_of_omega_grows_no_faster_than_the_rate_says() -> None:
     """Turning about one axis at constant ω, in the worst direction of a set: error ≤ e^(rate · angle) of its start."""
-    nine, rate = alem77.array(), ninacc.growth_rate(alem77.array().positions, alem77.array().axes)
+    nine = alem77.array()
+    rate = growth.growth_rate(nine.positions, nine.axes)
     time, seen = np.arange(1601) / 1600.0, []
     for direction in np.random.default_rng(3).standard_normal((20, 3)):
         omega = np.tile(3.0 * direction / np.linalg.norm(direction), (len(time), 1))

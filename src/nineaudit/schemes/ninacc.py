@@ -13,7 +13,7 @@ and, for triaxes of equal weight, about their centroid (the printed eq 15 holds 
     ω* = ω_i + h/24 (55 f_i − 59 f_i−1 + 37 f_i−2 − 9 f_i−3),   ω_i+1 = ω_i + h/24 (9 f* + 19 f_i − 5 f_i−1 + f_i−2)
 
 with f = α(y, ω). The feedback lets an error grow with the angle turned, by e^0.53 per rad for triaxes at 3, 4, 5 in
-(METHODS 1.3; `growth_rate`): the whole-record smoother (estimate/trajectory.py) has no such growth.
+(METHODS 1.3; growth.py): the whole-record smoother (estimate/trajectory.py) has no such growth.
 """
 
 from __future__ import annotations
@@ -158,20 +158,6 @@ def _first_four(free: FloatArray, products: FloatArray, step: float, omega0: Flo
         if not change > _SETTLED * max(1.0, float(np.abs(omega).max())):
             break
     return omega
-
-
-def growth_rate(positions: FloatArray, axes: FloatArray) -> float:
-    """Largest growth of an error of ω per rad turned, when ω is fed back into the least-squares α (METHODS 1.3).
-
-    Over the directions e of rotation, the largest real part of an eigenvalue of −∂(KQ p(ω))/∂ω at ω = e. Equal weights.
-    """
-    coefficients = solver(positions, axes).products[3:]
-    grid = np.random.default_rng(1977).standard_normal((4000, 3))
-    x, y, z = (grid / np.linalg.norm(grid, axis=1, keepdims=True)).T
-    o = np.zeros_like(x)
-    slopes = np.array([[2 * x, o, o], [o, 2 * y, o], [o, o, 2 * z], [o, z, y], [z, o, x], [y, x, o]])
-    jacobian = -np.einsum("ip,pjn->nij", coefficients, slopes)
-    return float(np.linalg.eigvals(jacobian).real.max())
 
 
 def _products(w: FloatArray) -> FloatArray:
