@@ -24,7 +24,7 @@ from nineaudit.estimate.motion import Motion, bridge, estimate_motion, has_rates
 from nineaudit.estimate.trajectory import Fit, fit
 from nineaudit.physics import rigid_body
 from nineaudit.rig import Point
-from nineaudit.schemes import martin, ninacc, rating, rgla, takhounts
+from nineaudit.schemes import growth, martin, ninacc, rating, rgla, takhounts
 
 DRAWS: Final = 16
 """Draws of the instrument: the standard deviation of a budget is known to 1/√(2·15), 18 %."""
@@ -142,11 +142,16 @@ def _schemes(case: Case) -> dict[str, Scheme]:
         found = ninacc.forward(array, time[start:], readings[start:], np.zeros(3), sigma[_accelerometers(array)] ** 2)
         return _from(found, start)
 
+    def by_six_accelerometers(readings: FloatArray) -> Motion:
+        start = _rest(case)
+        return _from(growth.motion(array, time[start:], readings[start:], np.zeros(3))[0], start)
+
     return {
         "map": by_map,
         "optimised": by_fit_at_its_word,
         "product-free": by_padgaonkar,
         "ninacc": by_ninacc,
+        "six-accelerometers": by_six_accelerometers,
         "rates": by_rates,
         "periphery": lambda y: martin.periphery(array, time, y, sigma),
         "co-planar": lambda y: martin.coplanar(array, time, y, sigma),
@@ -254,7 +259,7 @@ def _row(
 def _lowest(curve: FloatArray, against: FloatArray, time: FloatArray) -> float:
     """Lowest moving correlation where the reference is above a tenth of its peak; NaN where there is none."""
     per_second = (len(time) - 1) / float(time[-1] - time[0])
-    if round(martin.WINDOW * per_second / 2.0) < 1:
+    if martin.WINDOW * per_second < 2.0:
         return float("nan")
     moving = martin.moving_correlation(curve, against, per_second)
     told = np.isfinite(moving) & (np.abs(against) > 0.1 * np.abs(against).max())

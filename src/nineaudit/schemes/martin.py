@@ -194,7 +194,7 @@ def four_pole_butterworth(values: FloatArray, rate: float, corner: float) -> Flo
 def moving_correlation(first: FloatArray, second: FloatArray, rate: float, window: float = WINDOW) -> FloatArray:
     """(n,) Pearson correlation of two curves (n,) in a window (s) about each sample; NaN where a curve is constant in
     it and at the ends, where the window is not full. EstimationError where it holds fewer than three samples."""
-    count = 2 * round(window * rate / 2.0) + 1
+    count = 2 * int(window * rate / 2.0 + 1e-6) + 1
     if count < 3 or count > len(first) or first.shape != second.shape:
         raise EstimationError(
             "curves cannot be correlated in the window",
