@@ -62,7 +62,8 @@ def path_of(made: Simulation, point: FloatArray = POINT) -> laboratory.Path:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_gives_the_motion_of_a_perfect_instrument(method: str) -> None:
     """No noise, no calibration errors: what is left is truncation, parts in a thousand at 10 kHz."""
-    made = simulate(rig_of("naap-gyro"), "general", seed=2, imperfect=False, noise=False)
+    preset = "3-2-1" if method == "six-accelerometers" else "naap-gyro"
+    made = simulate(rig_of(preset), "general", seed=2, imperfect=False, noise=False)
     got = motion_of(Case(made.recording), method, count=0)
     true = path_of(made)
     pairs = [(got.omega, made.truth.omega), (got.alpha, made.truth.alpha), (got.paths["CG"].a_body, true.a_body)]
@@ -98,7 +99,12 @@ def test_without_rest_and_without_omega_the_start_is_asked_for() -> None:
 
 def test_a_method_that_the_array_does_not_allow_says_what_is_missing() -> None:
     case = Case(simulate(rig_of("triax-3"), "general").recording)
-    for method, said in (("padgaonkar", "no 3-2-2-2"), ("rates", "no rate sensors"), ("product-free", "rank 9")):
+    for method, said in (
+        ("padgaonkar", "no 3-2-2-2"),
+        ("rates", "no rate sensors"),
+        ("six-accelerometers", "expected 6"),
+        ("product-free", "rank 9"),
+    ):
         with pytest.raises(EstimationError, match=said):
             motion_of(case, method)
     with pytest.raises(ConfigurationError, match=r"did you mean ninacc\?"):

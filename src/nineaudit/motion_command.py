@@ -30,7 +30,10 @@ def motion(
         list[str] | None,
         typer.Option(metavar="[NAME=]X,Y,Z", help="In the rig's length unit, in place of its points; may be repeated."),
     ] = None,
-    method: Annotated[str, typer.Option(metavar="NAME", help="map, padgaonkar, ninacc, product-free, rates.")] = "map",
+    method: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="map, padgaonkar, ninacc, six-accelerometers, product-free, rates."),
+    ] = "map",
     output: Annotated[
         Path | None, typer.Option(metavar="F", help="All curves: .csv, .parquet, or .mcap with poses.")
     ] = None,

@@ -16,7 +16,7 @@ from nineaudit.estimate import trajectory
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, estimate_motion, has_rates
 from nineaudit.estimate.samples import Samples, at_samples
 from nineaudit.physics import kinematics, nap, rigid_body
-from nineaudit.schemes import ninacc
+from nineaudit.schemes import growth, ninacc
 
 Vector = tuple[float, float, float]
 
@@ -106,6 +106,12 @@ def _ninacc(case: Case, start: Start) -> Motion:
     return ninacc.forward(case.array, case.time, case.readings, omega0, case.sigma[held] ** 2)
 
 
+def _six_accelerometers(case: Case, start: Start) -> Motion:
+    """[Becker75]; the method's text carries the warning beyond a quarter turn."""
+    omega0, _ = _beginning(case, start)
+    return growth.motion(case.array, case.time, bridge(case.readings, case.time), omega0)[0]
+
+
 def _rates(case: Case, start: Start) -> Motion:
     del start
     if not has_rates(case.array):
@@ -146,6 +152,7 @@ METHODS: Final[Mapping[str, tuple[Method, str]]] = {
     "map": (_map, "whole-record maximum a posteriori fit of all channels, with uncertainties"),
     "padgaonkar": (_padgaonkar, "3-2-2-2: α without feedback, integrated"),
     "ninacc": (_ninacc, "triaxes anywhere: least squares, ω fed back by predictor-corrector [Alem77]"),
+    "six-accelerometers": (_six_accelerometers, "3-2-1: six unknowns of six, ω fed back step by step [Becker75]"),
     "product-free": (_product_free, "any array that gives α without products of ω, integrated"),
     "rates": (_rates, "rate sensors on three axes, α from the accelerometers or by differences"),
 }

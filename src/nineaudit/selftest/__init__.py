@@ -5,12 +5,12 @@ One module a source; each has `checks()`, a list of Published.
 
 from __future__ import annotations
 
-from nineaudit.selftest import constants, filters, injury
+from nineaudit.selftest import alem77, becker75, constants, filters, hu77, injury, martin98, takhounts09
 from nineaudit.selftest.published import Published
 
 __all__ = ["PARTS", "Published", "all_checks"]
 
-PARTS = (constants, filters, injury)
+PARTS = (alem77, becker75, takhounts09, hu77, martin98, constants, filters, injury)
 """The modules of the record, in its order."""
 
 
