@@ -14,7 +14,7 @@ from jsonschema import Draft202012Validator
 from scipy.spatial.transform import Rotation
 
 from nineaudit import cli
-from nineaudit.array import FloatArray
+from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.finding import Verdict
@@ -24,7 +24,7 @@ from nineaudit.motion_files import FRAME_TRANSFORM, POSE_IN_FRAME, columns, writ
 from nineaudit.motion_methods import METHODS
 from nineaudit.motion_triax import Judged, check_triax
 from nineaudit.physics import kinematics, laboratory, rigid_body
-from nineaudit.presets import preset_text
+from nineaudit.presets import PRESETS, preset_text
 from nineaudit.report.motion_page import render_motion
 from nineaudit.rig import Point, Rig, parse_rig
 from nineaudit.simulate import Simulation, simulate
@@ -36,6 +36,15 @@ POINT = np.array([0.01, 0.0, -0.005])
 
 def rig_of(preset: str) -> Rig:
     return replace(parse_rig(preset_text(preset)), points=(Point("CG", POINT),))
+
+
+def rig_for(method: str) -> Rig:
+    """A rig whose sensors the method is made for."""
+    if method != "periphery":
+        made_for = {"six-accelerometers": "3-2-1", "co-planar": "coplanar-3-gyro"}
+        return rig_of(made_for.get(method, method if method in PRESETS else "naap-gyro"))
+    rig, gyros = rig_of("triax-3"), rig_of("rgla").array
+    return replace(rig, array=SensorArray(rig.array.sensors + tuple(s for s in gyros.sensors if s.kind == "gyroscope")))
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +71,7 @@ def path_of(made: Simulation, point: FloatArray = POINT) -> laboratory.Path:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_gives_the_motion_of_a_perfect_instrument(method: str) -> None:
     """No noise, no calibration errors: what is left is truncation, parts in a thousand at 10 kHz."""
-    preset = "3-2-1" if method == "six-accelerometers" else "naap-gyro"
-    made = simulate(rig_of(preset), "general", seed=2, imperfect=False, noise=False)
+    made = simulate(rig_for(method), "general", seed=2, imperfect=False, noise=False)
     got = motion_of(Case(made.recording), method, count=0)
     true = path_of(made)
     pairs = [(got.omega, made.truth.omega), (got.alpha, made.truth.alpha), (got.paths["CG"].a_body, true.a_body)]

@@ -32,7 +32,11 @@ def motion(
     ] = None,
     method: Annotated[
         str,
-        typer.Option(metavar="NAME", help="map, padgaonkar, ninacc, six-accelerometers, product-free, rates."),
+        typer.Option(
+            metavar="NAME",
+            help="map, padgaonkar, ninacc, six-accelerometers, product-free, rates, periphery, co-planar, "
+            "compact-cube, rgla.",
+        ),
     ] = "map",
     output: Annotated[
         Path | None, typer.Option(metavar="F", help="All curves: .csv, .parquet, or .mcap with poses.")

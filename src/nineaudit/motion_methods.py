@@ -9,14 +9,14 @@ from typing import Final
 
 import numpy as np
 
-from nineaudit.array import FloatArray
+from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.estimate import trajectory
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, estimate_motion, has_rates
 from nineaudit.estimate.samples import Samples, at_samples
 from nineaudit.physics import kinematics, nap, rigid_body
-from nineaudit.schemes import growth, ninacc
+from nineaudit.schemes import growth, martin, ninacc, rgla
 
 Vector = tuple[float, float, float]
 
@@ -126,6 +126,16 @@ def _rates(case: Case, start: Start) -> Motion:
     return Motion(omega, alpha, a0, found.method)
 
 
+def _with_rates(scheme: Callable[[SensorArray, FloatArray, FloatArray, FloatArray], Motion]) -> Method:
+    """A scheme that measures ω: nothing needs to be known of the start."""
+
+    def solve(case: Case, start: Start) -> Motion:
+        del start
+        return scheme(case.array, case.time, case.readings, case.sigma)
+
+    return solve
+
+
 def _beginning(case: Case, start: Start) -> tuple[FloatArray, int | None]:
     """ω(0), and the sample at which ω is to be 0 where that is what is known.
 
@@ -155,6 +165,10 @@ METHODS: Final[Mapping[str, tuple[Method, str]]] = {
     "six-accelerometers": (_six_accelerometers, "3-2-1: six unknowns of six, ω fed back step by step [Becker75]"),
     "product-free": (_product_free, "any array that gives α without products of ω, integrated"),
     "rates": (_rates, "rate sensors on three axes, α from the accelerometers or by differences"),
+    "periphery": (_with_rates(martin.periphery), "triaxes on three axes and rate sensors [Martin98 eqs 8-13]"),
+    "co-planar": (_with_rates(martin.coplanar), "triaxes at the origin and on two axes, rate sensors [Martin98]"),
+    "compact-cube": (_with_rates(martin.compact_cube), "one triax and rate sensors, α by differences [Martin98]"),
+    "rgla": (_with_rates(rgla.motion), "accelerometers at the origin and rate sensors [Hu77]"),
 }
 """Name -> function and what it does."""
 
