@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from nineaudit.array import FloatArray
+from nineaudit import cli, motion_six
+from nineaudit.array import FloatArray, frozen
+from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.physics import rigid_body
 from nineaudit.presets import preset_text
@@ -15,6 +19,7 @@ from nineaudit.rig import parse_rig
 from nineaudit.schemes import envelope, growth, rate_gyro
 from nineaudit.schemes.six_accelerometers import Package, Solution, inverse, package, products, solve
 from nineaudit.selftest import becker75
+from nineaudit.simulate import simulate
 from nineaudit.simulate.motions import motion_function
 from nineaudit.simulate.truth import Truth
 
@@ -255,6 +260,69 @@ def test_a_gyros_bad_parameters_and_records_are_refused() -> None:
         rate_gyro.second_order(np.r_[np.nan, np.zeros(9)], time)
     with pytest.raises(EstimationError, match="nothing to compare"):
         rate_gyro.compare(np.zeros((10, 3)), np.zeros((10, 3)), time)
+
+
+@pytest.fixture(scope="module")
+def recorded() -> Case:
+    """A turn within a quarter turn by a perfect 3-2-1 array."""
+    return Case(simulate(parse_rig(preset_text("3-2-1")), "drop", seed=3, imperfect=False, noise=False).recording)
+
+
+def test_the_worst_case_of_a_recording_is_the_sum_over_its_channels(recorded: Case) -> None:
+    channels, limit = motion_six.chosen("0.005", recorded)
+    assert (channels, limit) == (recorded.array.channels, 0.005)
+    every = motion_six.worst_case(recorded, np.zeros(3), channels, limit)
+    each = [motion_six.worst_case(recorded, np.zeros(3), (c,), 2 * limit).at_end for c in channels]
+    np.testing.assert_allclose(every.at_end, 0.5 * np.sum(each, axis=0), rtol=1e-12)
+    assert all(most >= end for most, end in zip(every.at_most, every.at_end, strict=True))
+    assert motion_six.chosen("a0z,a1z=0.01", recorded) == (("a0z", "a1z"), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"), [("a9z=0.005", "no such accelerometer; found 'a9z'"), ("5%", "a share of 1")]
+)
+def test_a_worst_case_that_is_none_is_a_sentence(text: str, said: str, recorded: Case) -> None:
+    with pytest.raises(ConfigurationError, match=said):
+        motion_six.chosen(text, recorded)
+
+
+def test_slow_rate_sensors_of_a_recording_agree_through_their_response() -> None:
+    made = simulate(parse_rig(preset_text("naap-gyro")), "general", seed=3, imperfect=False, noise=False)
+    readings = made.recording.readings.copy()
+    readings[:, 9:] = rate_gyro.second_order(readings[:, 9:], made.recording.time)
+    case = Case(replace(made.recording, readings=frozen(readings)))
+    assert max(motion_six.agreement(case, made.truth.omega, 37.0, 0.5).of_peak) < 1e-6
+    assert max(motion_six.agreement(case, made.truth.omega, 74.0, 0.5).of_peak) > 0.01
+    six = Case(simulate(parse_rig(preset_text("3-2-1")), "drop").recording)
+    with pytest.raises(EstimationError, match="no rate sensors on three axes to compare with"):
+        motion_six.agreement(six, np.zeros((len(six.time), 3)), 37.0, 0.5)
+
+
+def test_the_command_says_warning_worst_case_and_agreement(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def run(line: str) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            cli.main(line.split())
+        shown = capsys.readouterr()
+        return int(ended.value.code or 0), shown.out, shown.err
+
+    text = preset_text("3-2-1") + "".join(
+        f'\n[[sensor]]\nchannel = "g{axis}"\nkind = "gyroscope"\naxis = {[float(axis == a) for a in "xyz"]}\n'
+        for axis in "xyz"
+    )
+    Path("rig.toml").write_text(text, encoding="utf-8")
+    run("simulate rig.toml --motion general --output T.csv --rate 4000")
+    options = "--worst-case a0z,a1z=0.005 --gyro-response 37,0.5"
+    code, shown, said = run(f"motion T.csv --rig rig.toml --method six-accelerometers {options}")
+    assert (code, said) == (0, "")
+    assert "about a quarter turn (90°, 4.81 times, Becker and Willems 1975)" in shown
+    assert "gains of a0z, a1z off by up to 0.5 %, worst signs:" in shown
+    assert "ω through a response of 37 Hz, ζ = 0.5, less the rate sensors" in shown
+    code, _, said = run("motion T.csv --rig rig.toml --method six-accelerometers --gyro-response 37")
+    assert (code, "--gyro-response: response of the rate sensors; found '37'" in said) == (2, True)
 
 
 def test_the_published_numbers_come_out() -> None:

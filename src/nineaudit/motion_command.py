@@ -21,6 +21,13 @@ EXAMPLE = example(
 )
 
 Triple = tuple[float, float, float]
+WorstCase = Annotated[
+    str | None,
+    typer.Option(metavar="[CH,..=]U", help="Six accelerometers: how far these errors of gain can take ω: 0.005"),
+]
+GyroResponse = Annotated[
+    str | None, typer.Option(metavar="HZ,ZETA", help="Compare ω with the rate sensors through their response: 37,0.5")
+]
 
 
 def motion(
@@ -53,6 +60,8 @@ def motion(
         str | None,
         typer.Option(metavar="PREFIX", help="Predict this extra triax from the others; HIC, GSI deviations."),
     ] = None,
+    worst_case: WorstCase = None,
+    gyro_response: GyroResponse = None,
     dbc: Dbc = None,
     force: Force = False,
 ) -> tuple[list[str], int]:
@@ -81,6 +90,7 @@ def motion(
     case = Case(read(recording, instrument, dbc=dbc or ()))
     found = motion_of(case, method, start)
     lines = [*summary(found, instrument, recording.name), *_written(found, instrument, recording, output, html, force)]
+    lines += [*_worst_case_lines(case, found, worst_case), *_gyro_lines(case, found, gyro_response)]
     if check_triax is None:
         return lines, 0
     said, passed = _triax_lines(case, check_triax, method, start)
@@ -130,6 +140,41 @@ def summary(found: Kinematics, rig: Rig, name: str) -> list[str]:
         reach = f"{quantity(fastest, 'm/s')}, {quantity(farthest, unit)} from its start"
         lines.append(f"  {point} in the laboratory: at most {reach}")
     return [*lines, *(f"  note: {note}" for note in found.notes)]
+
+
+def _worst_case_lines(case: Case, found: Kinematics, text: str | None) -> list[str]:
+    if text is None:
+        return []
+    from nineaudit import motion_six
+    from nineaudit.report.numbers import digits
+
+    channels, limit = motion_six.chosen(text, case)
+    worst = motion_six.worst_case(case, found.omega[0], channels, limit)
+    end, most = (", ".join(digits(value, 3) for value in values) for values in (worst.at_end, worst.at_most))
+    return [
+        f"six accelerometers, gains of {', '.join(channels)} off by up to {100 * limit:g} %, worst signs:",
+        f"  ω x, y, z at the end by up to {end} rad/s, {100 * worst.of_peak:.1f} % of its peak; at most {most} rad/s",
+    ]
+
+
+def _gyro_lines(case: Case, found: Kinematics, text: str | None) -> list[str]:
+    if text is None:
+        return []
+    from nineaudit import motion_six
+    from nineaudit.commands import numbers
+    from nineaudit.report.numbers import digits
+
+    response = numbers(text, "--gyro-response") or []
+    if len(response) != 2:
+        raise ConfigurationError(
+            "response of the rate sensors", place="--gyro-response", found=text, expected="HZ,ZETA such as 37,0.5"
+        )
+    done = motion_six.agreement(case, found.omega, *response)
+    largest, rms = (", ".join(digits(value, 3) for value in values) for values in (done.largest, done.rms))
+    return [
+        f"ω through a response of {response[0]:g} Hz, ζ = {response[1]:g}, less the rate sensors, x, y, z:",
+        f"  largest {largest} rad/s, {100 * max(done.of_peak):.2g} % of their peak; rms {rms} rad/s",
+    ]
 
 
 def _triax_lines(case: Case, prefix: str, method: str, start: Start) -> tuple[list[str], bool]:
