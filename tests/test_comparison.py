@@ -98,8 +98,9 @@ def test_a_fault_is_not_explained():
 
 
 def test_points_follow_the_rigid_body(healthy):
-    recording, found = healthy
-    case = Case(recording)
+    case = Case(healthy[0])
+    recording, found = case.recording, compare(case, draws=2, cfc=0.0)
+    assert found.cfc is None
     curves = outputs(case.healthy.motion, recording.rig.points)
     assert set(curves) == {"alpha", "omega", "a0", "a(CG)"}
     assert found.curves["map"]["a(CG)"] == pytest.approx(curves["a(CG)"])
@@ -113,7 +114,8 @@ def test_text_and_page_hold_every_row(healthy):
     assert any(line.startswith("not run: periphery: ") for line in text)
     page = render(found, recording)
     assert page.count("<tr>") == 1 + len(found.rows)
-    assert page.count('class="chart"') == 12
+    assert page.count('class="chart"') == 2 * 12  # six schemes, four to a figure
+    assert "CFC180" in text[0]
     assert "a(CG) z" in page
 
 
@@ -123,6 +125,8 @@ def test_wrong_questions_are_answered_in_a_sentence():
         compare(Case(recorded()), "nap", draws=2)
     with pytest.raises(ConfigurationError, match="the scheme cannot run"):
         compare(Case(recorded()), "periphery", draws=2)
+    with pytest.raises(EstimationError, match="sampled too slowly for CFC3000"):
+        compare(case, cfc=3000.0)
     with pytest.raises(ConfigurationError, match="too few draws"):
         compare(case, draws=1)
 
@@ -143,3 +147,11 @@ def test_the_command_prints_the_table_and_writes_the_page(tmp_path, capsys, monk
     assert "4 schemes, against map" in shown.out.splitlines()[0]
     assert (tmp_path / "o.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert run("compare", "T.csv", "--rig", "rig.toml", "--reference", "rgla")[0] == 2
+
+
+def test_an_array_whose_accelerometers_do_not_tell_alpha_is_compared_by_its_rates():
+    """The whole-record fit would leave α to differences of ω at the noise's mercy: it is refused, with the rank."""
+    found = compare(Case(recorded("rgla")), draws=3)
+    assert found.reference == "rates"
+    assert set(found.curves) == {"rates", "compact-cube", "rgla"}
+    assert "rank 3" in found.refused["map"]

@@ -173,6 +173,7 @@ def compare(
     rig: RigOption,
     reference: Annotated[str | None, typer.Option(metavar="SCHEME", help="Default: map, the whole-record fit.")] = None,
     draws: Annotated[int, typer.Option(help="Of the instrument, for the budgets of the differences.")] = 16,
+    cfc: Annotated[float | None, typer.Option(metavar="CLASS", help="Of all curves; default 180, 0: none.")] = None,
     dbc: Dbc = None,
     html: Annotated[Path | None, typer.Option(metavar="F", help="Write the page with the curves.")] = None,
 ) -> None:
@@ -183,7 +184,7 @@ def compare(
 
     instrument = load_rig(rig)
     protect([html], [recording, rig, *(dbc or instrument.dbc)])
-    _print(commands.compared(recording, instrument, reference, draws=draws, dbc=dbc or (), html=html))
+    _print(commands.compared(recording, instrument, reference, draws=draws, cfc=cfc, dbc=dbc or (), html=html))
 
 
 @app.command(epilog=example("nineaudit demo"))

@@ -126,7 +126,14 @@ def selftested(date: str | None = None, json: Path | None = None) -> tuple[list[
 
 
 def compared(
-    path: Path, rig: Rig, reference: str | None, *, draws: int, dbc: Sequence[Path] = (), html: Path | None = None
+    path: Path,
+    rig: Rig,
+    reference: str | None,
+    *,
+    draws: int,
+    cfc: float | None = None,
+    dbc: Sequence[Path] = (),
+    html: Path | None = None,
 ) -> list[str]:
     """Every scheme of a recording against the reference, as lines; the page where it is wanted."""
     from nineaudit.case import Case
@@ -135,7 +142,7 @@ def compared(
     from nineaudit.report.comparison_page import lines, render
 
     recording = read(path, rig, dbc=dbc)
-    found = compare(Case(recording), reference, draws)
+    found = compare(Case(recording), reference, draws, cfc=cfc)
     if html is not None:
         write_text(html, render(found, recording))
     return lines(found, recording) + ([] if html is None else [str(html)])

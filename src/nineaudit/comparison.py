@@ -6,32 +6,37 @@ readings by the calibration errors of calibration.columns, one standard deviatio
 noise, and every scheme runs on the same draw. So an error that two schemes share does not count between them.
 
     ratio = rms(curve − reference) / rms(u of the difference),   explained where ratio ≤ k = 2
+
+All of α, ω and a0 go through one channel frequency class first, CFC180 unless another is asked for (Martin98: four
+poles at 300 Hz): unfiltered, a derivative of ω is mostly noise. Points are worked out from the filtered curves (SAE
+J211-1: filter before operations that are not linear).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from nineaudit.array import FloatArray, SensorArray
+from nineaudit.array import FloatArray
 from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.estimate import calibration
-from nineaudit.estimate.motion import Motion, bridge, estimate_motion, has_rates
-from nineaudit.estimate.trajectory import Fit, fit
-from nineaudit.physics import rigid_body
+from nineaudit.estimate.motion import Motion, bridge
+from nineaudit.physics import filters, rigid_body
 from nineaudit.rig import Point
-from nineaudit.schemes import growth, martin, ninacc, rating, rgla, takhounts
+from nineaudit.scheme_runs import Scheme, schemes_of
+from nineaudit.schemes import martin, rating
 
 DRAWS: Final = 16
 """Draws of the instrument: the standard deviation of a budget is known to 1/√(2·15), 18 %."""
 EXPLAINED: Final = 2.0
 SEED: Final = 1998
+CLASS: Final = 180.0
+"""Channel frequency class of the curves, where the blocks are sampled ten times as fast."""
 Curves = Mapping[str, FloatArray]
-Scheme = Callable[[FloatArray], Motion]
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,8 @@ class Row:
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """`curves` by scheme and quantity, each (m,3) SI on `time` (m,) s; `methods` in words; `rows` against
-    `reference`; `refused` schemes with the reason. `draws` of the instrument behind the budgets."""
+    `reference`; `refused` schemes with the reason; `cfc` of all curves, None: unfiltered. `draws` of the instrument
+    behind the budgets."""
 
     time: FloatArray
     reference: str
@@ -72,19 +78,24 @@ class Comparison:
     curves: Mapping[str, Curves]
     rows: tuple[Row, ...]
     refused: Mapping[str, str]
+    cfc: float | None
     draws: int
 
 
-def compare(case: Case, reference: str | None = None, draws: int = DRAWS, seed: int = SEED) -> Comparison:
+def compare(
+    case: Case, reference: str | None = None, draws: int = DRAWS, seed: int = SEED, cfc: float | None = None
+) -> Comparison:
     """Run every scheme on the block means of `case` and compare each with `reference`, by default the whole-record fit,
-    or else the first that runs.
+    or else the first that runs. `cfc` of the curves: None is CLASS, unfiltered where that is too fast; 0 unfiltered.
 
     Raises ConfigurationError for a reference that is no scheme or does not run, or fewer than two draws;
-    EstimationError where fewer than two schemes run.
+    EstimationError where fewer than two schemes run, or the blocks are too slow for a class that is asked for.
     """
     if draws < 2:
         raise ConfigurationError("too few draws", place="--draws", found=draws, expected="2 or more")
-    schemes, readings = _schemes(case), bridge(case.condensed.readings, case.condensed.time)
+    class_ = _class(case.condensed.time, cfc)
+    schemes = {name: _filtered(scheme, case.condensed.time, class_) for name, scheme in schemes_of(case).items()}
+    readings = bridge(case.condensed.readings, case.condensed.time)
     motions, refused = _run(schemes, readings)
     chosen = _reference(reference, tuple(schemes), motions, refused)
     points = case.recording.rig.points
@@ -99,7 +110,7 @@ def compare(case: Case, reference: str | None = None, draws: int = DRAWS, seed: 
         for axis in range(3)
     ]
     methods = {name: motion.method for name, motion in motions.items()}
-    return Comparison(case.condensed.time, chosen, methods, curves, tuple(rows), refused, len(spread))
+    return Comparison(case.condensed.time, chosen, methods, curves, tuple(rows), refused, class_, len(spread))
 
 
 def outputs(motion: Motion, points: tuple[Point, ...]) -> dict[str, FloatArray]:
@@ -113,69 +124,30 @@ def unit_of(quantity: str) -> str:
     return {"alpha": "rad/s^2", "omega": "rad/s"}.get(quantity, "m/s^2")
 
 
-def _schemes(case: Case) -> dict[str, Scheme]:
-    """Schemes by name: readings (m,k) of the blocks to a motion; each refuses with an EstimationError."""
-    blocks, array = case.condensed, case.array
-    time, sigma = blocks.time, blocks.sigma
-    fitted: list[Fit] = []
-
-    def by_map(readings: FloatArray) -> Motion:
-        data = replace(case.fit_data, readings=readings)
-        fitted.append(fit(data, fitted[0].omega, fitted[0].theta) if fitted else case.healthy)
-        return fitted[-1].motion
-
-    def by_fit_at_its_word(readings: FloatArray) -> Motion:
-        return takhounts.optimise(replace(case.fit_data, readings=readings)).motion
-
-    def by_padgaonkar(readings: FloatArray) -> Motion:
-        held = _accelerometers(array)
-        chosen = array.select(held)
-        return estimate_motion(chosen, time, readings[:, held], sigma[held], _rest(case))
-
-    def by_rates(readings: FloatArray) -> Motion:
-        if not has_rates(array):
-            raise EstimationError("no rate sensors on three axes")
-        return estimate_motion(array, time, readings, sigma)
-
-    def by_ninacc(readings: FloatArray) -> Motion:
-        start = _rest(case)
-        found = ninacc.forward(array, time[start:], readings[start:], np.zeros(3), sigma[_accelerometers(array)] ** 2)
-        return _from(found, start)
-
-    def by_six_accelerometers(readings: FloatArray) -> Motion:
-        start = _rest(case)
-        return _from(growth.motion(array, time[start:], readings[start:], np.zeros(3))[0], start)
-
-    return {
-        "map": by_map,
-        "optimised": by_fit_at_its_word,
-        "product-free": by_padgaonkar,
-        "ninacc": by_ninacc,
-        "six-accelerometers": by_six_accelerometers,
-        "rates": by_rates,
-        "periphery": lambda y: martin.periphery(array, time, y, sigma),
-        "co-planar": lambda y: martin.coplanar(array, time, y, sigma),
-        "compact-cube": lambda y: martin.compact_cube(array, time, y, sigma),
-        "rgla": lambda y: rgla.motion(array, time, y, sigma),
-    }
+def _class(time: FloatArray, cfc: float | None) -> float | None:
+    if cfc is None:
+        return CLASS if filters.fast_enough(_rate(time), CLASS) else None
+    if cfc != 0.0:
+        filters.coefficients(cfc, _rate(time))
+    return cfc or None
 
 
-def _accelerometers(array: SensorArray) -> list[int]:
-    return [int(i) for i in np.flatnonzero(array.is_accelerometer)]
+def _filtered(scheme: Scheme, time: FloatArray, class_: float | None) -> Scheme:
+    """The scheme with its curves through a class."""
+    if class_ is None:
+        return scheme
+    rate = _rate(time)
+
+    def run(readings: FloatArray) -> Motion:
+        found = scheme(readings)
+        omega, alpha, a0 = (filters.cfc(v, rate, class_) for v in (found.omega, found.alpha, found.a0))
+        return Motion(omega, alpha, a0, found.method)
+
+    return run
 
 
-def _rest(case: Case) -> int:
-    """Block at which the rest begins. EstimationError where there is none."""
-    return case.required_rest.start // case.condensed.length
-
-
-def _from(motion: Motion, start: int) -> Motion:
-    """The motion with what lies before `start` at rest."""
-    if start == 0:
-        return motion
-    still = np.zeros((start, 3))
-    a0 = np.vstack([np.tile(motion.a0[:1], (start, 1)), motion.a0])
-    return Motion(np.vstack([still, motion.omega]), np.vstack([still, motion.alpha]), a0, motion.method)
+def _rate(time: FloatArray) -> float:
+    return (len(time) - 1) / float(time[-1] - time[0])
 
 
 def _run(schemes: Mapping[str, Scheme], readings: FloatArray) -> tuple[dict[str, Motion], dict[str, str]]:
@@ -258,7 +230,7 @@ def _row(
 
 def _lowest(curve: FloatArray, against: FloatArray, time: FloatArray) -> float:
     """Lowest moving correlation where the reference is above a tenth of its peak; NaN where there is none."""
-    per_second = (len(time) - 1) / float(time[-1] - time[0])
+    per_second = _rate(time)
     if martin.WINDOW * per_second < 2.0:
         return float("nan")
     moving = martin.moving_correlation(curve, against, per_second)

@@ -11,7 +11,8 @@ from nineaudit.recording import Recording
 from nineaudit.report.chart import Chart, Line
 from nineaudit.report.figures import Figure, figure
 from nineaudit.report.numbers import digits, edge, spelled
-from nineaudit.report.page import style, template
+from nineaudit.report.page import style as sheet
+from nineaudit.report.page import template
 
 HEADERS = (
     "scheme", "curve", "unit", "r", "r 2.5 ms", "ISO 18571", "grade", "peak", "difference", "U", "ratio", "budget",
@@ -54,13 +55,14 @@ def _heading(comparison: Comparison, recording: Recording) -> str:
     return (
         f"{recording.source.path}: {len(comparison.curves)} schemes, against {comparison.reference} "
         f"({comparison.methods[comparison.reference]}); {verdict} {EXPLAINED:g} times what the rig's uncertainties "
-        f"explain ({comparison.draws} draws of the instrument)"
+        f"explain ({comparison.draws} draws of the instrument; "
+        f"{'unfiltered' if comparison.cfc is None else f'CFC{comparison.cfc:g}'})"
     )
 
 
 def render(comparison: Comparison, recording: Recording) -> str:
     """The page: the same table, and the curves of all schemes over each other."""
-    context: dict[str, Any] = style() | {
+    context: dict[str, Any] = sheet() | {
         "name": recording.source.path.name,
         "rig": recording.rig.name,
         "sentence": _heading(comparison, recording),
@@ -75,25 +77,28 @@ def render(comparison: Comparison, recording: Recording) -> str:
 
 
 def figures(comparison: Comparison, recording: Recording) -> list[Figure]:
-    """One figure for each component of each quantity, all schemes overlaid, the reference broad."""
+    """Figures for each component of each quantity, four schemes at a time over the reference, which is broad."""
+    others = [name for name in comparison.curves if name != comparison.reference]
+    groups = [others[i : i + len(_STYLES)] for i in range(0, len(others), len(_STYLES))]
     units = {row.quantity: row.unit for row in comparison.rows}
     return [
-        _figure(comparison, recording, quantity, axis, units[quantity])
+        _figure(comparison, recording, (quantity, axis, part), group, units[quantity])
         for quantity in comparison.curves[comparison.reference]
         for axis in range(3)
+        for part, group in enumerate(groups, 1)
     ]
 
 
-def _figure(comparison: Comparison, recording: Recording, quantity: str, axis: int, si: str) -> Figure:
-    unit, one = edge(si, recording.rig)
-    others = [name for name in comparison.curves if name != comparison.reference]
-    curve = {name: curves[quantity][:, axis] / one for name, curves in comparison.curves.items()}
-    drawn = [Line(curve[comparison.reference], "rebuilt", comparison.reference, name_at_peak=True)]
-    drawn += [Line(curve[name], _STYLES[i % len(_STYLES)], name, name_at_peak=True) for i, name in enumerate(others)]
+def _figure(
+    comparison: Comparison, recording: Recording, which: tuple[str, int, int], names: list[str], si: str
+) -> Figure:
+    (quantity, axis, part), (unit, one) = which, edge(si, recording.rig)
+    styles = {comparison.reference: "rebuilt", **dict(zip(names, _STYLES, strict=False))}
+    drawn = tuple(Line(comparison.curves[name][quantity][:, axis] / one, style, name) for name, style in styles.items())
     title = f"{_NAMES.get(quantity, quantity)}, {'xyz'[axis]}"
     peak = f"peak of {comparison.reference} {digits(float(np.abs(drawn[0].values).max()))} {spelled(unit)}"
-    names = ", ".join(line.label for line in drawn)
-    chart = Chart(f"{_key(quantity)}-{axis}", title, f"{names}; {peak}.", comparison.time, spelled(unit), tuple(drawn))
+    told = f"{', '.join(styles)}; {peak}."
+    chart = Chart(f"{_key(quantity)}-{axis}-{part}", title, told, comparison.time, spelled(unit), drawn)
     return figure(chart, f"{title}, {spelled(unit)}; {peak}.")
 
 

@@ -1,0 +1,96 @@
+"""The schemes of the papers by name, as functions of the readings of one case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from nineaudit.array import FloatArray, SensorArray
+from nineaudit.case import Case
+from nineaudit.errors import EstimationError
+from nineaudit.estimate.motion import Motion, estimate_motion, has_rates
+from nineaudit.estimate.trajectory import Fit, fit
+from nineaudit.physics import rigid_body
+from nineaudit.schemes import growth, martin, ninacc, rgla, takhounts
+
+Scheme = Callable[[FloatArray], Motion]
+"""Readings (m,k) SI of the blocks of a case to the motion; EstimationError where the sensors do not allow it."""
+
+
+def schemes_of(case: Case) -> dict[str, Scheme]:
+    """Schemes by name: readings (m,k) of the blocks to a motion; each refuses with an EstimationError."""
+    blocks, array = case.condensed, case.array
+    time, sigma = blocks.time, blocks.sigma
+    fitted: list[Fit] = []
+    sensed = rigid_body.design(array.positions, array.axes)[array.is_accelerometer] * [1, 1, 1, 20, 20, 20]
+    rank = int(np.linalg.matrix_rank(sensed, tol=1e-3)) if len(sensed) else 0
+
+    def require_alpha() -> None:
+        if rank < 6:
+            raise EstimationError(
+                "no accelerometers tell α, the fit leaves it to differences of ω",
+                found=f"rank {rank}",
+                expected="rank 6",
+            )
+
+    def by_map(readings: FloatArray) -> Motion:
+        require_alpha()
+        data = replace(case.fit_data, readings=readings)
+        fitted.append(fit(data, fitted[0].omega, fitted[0].theta) if fitted else case.healthy)
+        return fitted[-1].motion
+
+    def by_fit_at_its_word(readings: FloatArray) -> Motion:
+        require_alpha()
+        return takhounts.optimise(replace(case.fit_data, readings=readings)).motion
+
+    def by_padgaonkar(readings: FloatArray) -> Motion:
+        held = _accelerometers(array)
+        chosen = array.select(held)
+        return estimate_motion(chosen, time, readings[:, held], sigma[held], _rest(case))
+
+    def by_rates(readings: FloatArray) -> Motion:
+        if not has_rates(array):
+            raise EstimationError("no rate sensors on three axes")
+        return estimate_motion(array, time, readings, sigma)
+
+    def by_ninacc(readings: FloatArray) -> Motion:
+        start = _rest(case)
+        found = ninacc.forward(array, time[start:], readings[start:], np.zeros(3), sigma[_accelerometers(array)] ** 2)
+        return _from(found, start)
+
+    def by_six_accelerometers(readings: FloatArray) -> Motion:
+        start = _rest(case)
+        return _from(growth.motion(array, time[start:], readings[start:], np.zeros(3))[0], start)
+
+    return {
+        "map": by_map,
+        "optimised": by_fit_at_its_word,
+        "product-free": by_padgaonkar,
+        "ninacc": by_ninacc,
+        "six-accelerometers": by_six_accelerometers,
+        "rates": by_rates,
+        "periphery": lambda y: martin.periphery(array, time, y, sigma),
+        "co-planar": lambda y: martin.coplanar(array, time, y, sigma),
+        "compact-cube": lambda y: martin.compact_cube(array, time, y, sigma),
+        "rgla": lambda y: rgla.motion(array, time, y, sigma),
+    }
+
+
+def _accelerometers(array: SensorArray) -> list[int]:
+    return [int(i) for i in np.flatnonzero(array.is_accelerometer)]
+
+
+def _rest(case: Case) -> int:
+    """Block at which the rest begins. EstimationError where there is none."""
+    return case.required_rest.start // case.condensed.length
+
+
+def _from(motion: Motion, start: int) -> Motion:
+    """The motion with what lies before `start` at rest."""
+    if start == 0:
+        return motion
+    still = np.zeros((start, 3))
+    a0 = np.vstack([np.tile(motion.a0[:1], (start, 1)), motion.a0])
+    return Motion(np.vstack([still, motion.omega]), np.vstack([still, motion.alpha]), a0, motion.method)
