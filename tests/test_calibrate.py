@@ -392,6 +392,12 @@ def test_the_table_of_the_command_goes_into_a_rig_that_measures_true(rig: Rig, r
         assert sensor.scale == pytest.approx(size, abs=5 * sensor.u_gain)
         assert sensor.offset / sensor.to_si == pytest.approx(truth.offsets[i], abs=5 * sensor.u_zero / sensor.to_si)
         assert np.linalg.norm(np.cross(sensor.axis, truth.vectors[i] / size)) < 5 * sensor.u_alignment
+    understood = run("rig", "check", "new.toml")[1]
+    stated = re.search(r"a1y: .* scale ([-.\d]+), offset ([-.\d]+) g_0", understood)
+    assert stated is not None
+    assert float(stated[1]) == pytest.approx(made.array["a1y"].scale, rel=1e-5)
+    assert float(stated[2]) == pytest.approx(truth.offsets[3], abs=2e-3)
+    assert ", scale" not in run("rig", "check", "rig.toml")[1]
     i = rig.array.index("a1y")
     assert float(line[1]) == pytest.approx(float(np.linalg.norm(truth.vectors[i])), abs=1e-3)
     assert (tmp_path / "new.toml").read_text(encoding="utf-8").startswith("# Calibrated by nineaudit calibrate rate-")

@@ -13,6 +13,7 @@ from nineaudit.errors import ConfigurationError
 from nineaudit.outputs import require_absent, write_text
 
 if TYPE_CHECKING:
+    from nineaudit.array import Sensor
     from nineaudit.auditing import Audit
     from nineaudit.recording import Recording
     from nineaudit.rig import Rig
@@ -165,8 +166,16 @@ def rig_lines(rig: Rig) -> list[str]:
         axis = ", ".join(f"{x:.4g}" for x in sensor.axis)
         si = "m/s^2" if sensor.kind == "accelerometer" else "rad/s"
         full = "" if sensor.full_scale is None else f", range {display(sensor.full_scale, si, rig.units)}"
-        out.append(f"  {sensor.channel}: {sensor.kind}, at ({place}) {rig.units.length}, along ({axis}){full}")
+        said = f"  {sensor.channel}: {sensor.kind}, at ({place}) {rig.units.length}, along ({axis}){full}"
+        out.append(said + _calibrated(sensor))
     return out
+
+
+def _calibrated(sensor: Sensor) -> str:
+    """Scale and offset as the rig file states them, where they are not 1 and 0."""
+    if (sensor.scale, sensor.offset) == (1.0, 0.0):
+        return ""
+    return f", scale {sensor.scale:.6g}, offset {sensor.offset / sensor.to_si:.4g} {sensor.unit}"
 
 
 def preset_lines() -> list[str]:
