@@ -28,6 +28,8 @@ from nineaudit.estimate.trajectory import ROUGH, Fit, fit, log_determinant
 HOPELESS = 10.0
 """Cost per degree of freedom at which a fit that has not fallen below it in three steps need not go on: all evidence is
 relative, and a record that costs so much is not that of a healthy instrument."""
+ELSEWHERE = ("gain", "delay", "wrong_filter")
+"""Kinds that a large fault has in refitted.py, or whose shape is mostly the noise of the prediction."""
 LOOK = 8
 """Iterations of a fit that is only compared."""
 
@@ -119,11 +121,11 @@ def small_faults(healthy: Fit, onset: int, reference: float) -> list[Hypothesis]
 
 def curves(data: Data, left: Fit, channel: int, onset: int, reference: float, large: bool = False) -> list[Hypothesis]:
     """Shapes that do not know the signal in one channel, about the fit `left` that did not use it; of a `large` fault,
-    beside which the noise of that fit is nothing, those that follow the signal too."""
+    beside which the noise of that fit is little, those that follow the signal too."""
     peak = float(np.abs(left.ideal[:, channel]).max())
     off = np.where(data.weight[:, channel] > 0, data.readings[:, channel] - left.ideal[:, channel], 0.0)
     shapes = [*additive(data, channel, peak, onset, off=off), any_curve(data, channel, peak, onset)]
-    shapes += following(left, channel) if large else []
+    shapes += [s for s in following(left, channel) if s.word not in ELSEWHERE] if large else []
     return _compare(data, left.omega, theta_for(data, left), [(channel, s) for s in shapes], reference)
 
 

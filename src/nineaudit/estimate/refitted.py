@@ -172,13 +172,15 @@ def noisy(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis |
     return Hypothesis((channel,), "noise", log_evidence(found) - price - reference, found.statistic, {"factor": factor})
 
 
-def swapped(data: Data, pair: tuple[int, int], reference: float, hopeless: float) -> Hypothesis:
-    """Two channels taken for each other: the readings, with their weights, change places."""
+def swapped(data: Data, pair: tuple[int, int], reference: float, hopeless: float, choices: int) -> Hypothesis:
+    """Two channels taken for each other, of so many pairs: the readings, with their weights, change places. By chance
+    costs then differ as for delayed(), of two channels."""
     order = np.arange(len(data.array))
     order[list(pair)] = order[list(pair[::-1])]
     changed = replace(data, readings=data.readings[:, order], weight=data.weight[:, order])
     found = fit(changed, first_omega(changed), None, LOOK, ROUGH, hopeless)
-    return Hypothesis(pair, "swap", log_evidence(found) - reference, found.statistic)
+    price = float(np.sqrt(2.4 * (data.weight[:, list(pair)] > 0).sum())) + float(np.log(choices))
+    return Hypothesis(pair, "swap", log_evidence(found) - price - reference, found.statistic)
 
 
 def swap_costs(healthy: Fit, pairs: Sequence[tuple[int, int]], most: int) -> list[tuple[float, tuple[int, int]]]:

@@ -27,6 +27,8 @@ WHOLE = 1.1
 FAR, HOPELESS = 300.0, 2.0
 """Cost by which a channel's absence may mend less than the best one's; cost per degree of freedom over the lowest at
 which a fit without a channel is given up."""
+SMALL_GAIN = 0.3
+"""Gain error up to which its linear shape is as good as the gain itself."""
 LARGE = 3.0
 """What a sample of a channel costs, over what a healthy one does, where its fault bends the fit that uses it."""
 CLOSE_NATS = 20.0
@@ -59,8 +61,11 @@ def search(healthy: Fit, onset: int, wrong: BoolArray, limit: float) -> Search:
     without |= {k: fit(f.data, f.omega, f.theta) for k in close if not (f := without[k]).converged}
     found = [x for k in close for x in _closely(data, healthy, without[k], k, onset, wrong[:, k], small, reference)]
     found += [refitted.left_out(data, f, k, reference) for k, f in without.items() if k not in close]
-    if not found or max(found, key=lambda x: x.evidence).statistic > min(limit, WHOLE):
-        found += _of_two(healthy, without, close, min((x.statistic for x in found), default=np.inf), reference)
+    left = max(found, key=lambda x: x.evidence).statistic if found else np.inf
+    if left > min(limit, WHOLE):
+        found += _swaps(healthy, without, close, min((x.statistic for x in found), default=np.inf), reference)
+    if left > limit:
+        found += _of_two(data, without, close, reference)
     return Search(healthy, tuple(sorted(found, key=lambda x: -x.evidence)), without)
 
 
@@ -137,7 +142,7 @@ def _closely(
     found = [h.confirm(data, near, x, reference) for x, near in likely]
     found.append(refitted.any_waveform(data, left, channel, reference))
     # where a small gain mends the record, a large one is the same
-    mended = found[0].word == "gain" and found[0].statistic <= WHOLE
+    mended = found[0].word == "gain" and found[0].statistic <= WHOLE and abs(found[0].parameters["size"]) < SMALL_GAIN
     ways = (refitted.noisy, refitted.delayed) if mended else (refitted.scaled, refitted.noisy, refitted.delayed)
     found += [x for way in ways if (x := way(data, left, channel, reference)) is not None]
     if wrong.any():
@@ -145,17 +150,21 @@ def _closely(
     return found
 
 
-def _of_two(
+def _swaps(
     healthy: Fit, without: dict[int, Fit], close: Sequence[int], best: float, reference: float
 ) -> list[Hypothesis]:
-    """No single channel mends the record (`best`: what it costs at best): two of them swapped, or two of them free."""
+    """No single channel mends the record (`best`: what it costs at best): two of them taken for each other."""
     data = healthy.data
     kinds = data.array.is_accelerometer
     among = list(without) if len(without) <= FEW_CHANNELS else list(close)
     pairs = [(i, j) for i, j in combinations(among, 2) if kinds[i] == kinds[j]]
-    hopeless = HOPELESS * best * data.dof
     likely = refitted.swap_costs(healthy, pairs, ENOUGH)[:2]
-    found = [refitted.swapped(data, pair, reference, hopeless) for _, pair in likely]
+    return [refitted.swapped(data, pair, reference, HOPELESS * best * data.dof, len(pairs)) for _, pair in likely]
+
+
+def _of_two(data: Data, without: dict[int, Fit], close: Sequence[int], reference: float) -> list[Hypothesis]:
+    """The best of one channel is not that of a healthy record: two of them free."""
+    found = []
     for i, j in combinations(close, 2):
         if not _determined_without(data, i, j):
             continue
