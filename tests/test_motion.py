@@ -318,6 +318,16 @@ def test_mcap_has_poses_that_foxglove_knows(found: Kinematics, tmp_path: Path) -
     np.testing.assert_allclose(corner, list(pose["pose"]["position"].values()), atol=1e-12)  # type: ignore[index]
 
 
+def test_mcap_says_by_how_much_its_times_are_shifted(found: Kinematics, tmp_path: Path) -> None:
+    """A motion that starts before 0 cannot: log times are not negative."""
+    from mcap.reader import make_reader
+
+    write_motion(found, tmp_path / "m.mcap")
+    with (tmp_path / "m.mcap").open("rb") as file:
+        notes = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    assert int(notes["nineaudit"]["time_origin_ns"]) == round(found.time[0] * 1e9) < 0
+
+
 def test_a_file_in_the_way_or_of_no_known_kind_is_refused(found: Kinematics, tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text("mine")
     with pytest.raises(ConfigurationError, match="--force"):

@@ -21,6 +21,31 @@ EXAMPLE = example(
 )
 
 Triple = tuple[float, float, float]
+
+
+Points = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--point", metavar="[NAME=]X,Y,Z", help="In the rig's length unit, in place of its points; may be repeated."
+    ),
+]
+MethodName = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME",
+        help="map, padgaonkar, ninacc, six-accelerometers, product-free, rates, periphery, co-planar, compact-cube, "
+        "rgla.",
+    ),
+]
+Curves = Annotated[Path | None, typer.Option(metavar="F", help="All curves: .csv, .parquet, or .mcap with poses.")]
+Html = Annotated[Path | None, typer.Option(metavar="F", help="A page with plots.")]
+Omega = Annotated[str | None, typer.Option(metavar="X,Y,Z", help="ω at the first sample, rad/s, if not 0.")]
+Angles = Annotated[str, typer.Option(metavar="Y,P,R", help="Yaw, pitch, roll at first, degrees.")]
+Velocity = Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m/s.")]
+Position = Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m.")]
+Gravity = Annotated[
+    bool, typer.Option("--gravity", help="The sensors feel gravity (laboratory +z): put it right by the attitude.")
+]
 WorstCase = Annotated[
     str | None,
     typer.Option(metavar="[CH,..=]U", help="Six accelerometers: how far these errors of gain can take ω: 0.005"),
@@ -28,38 +53,24 @@ WorstCase = Annotated[
 GyroResponse = Annotated[
     str | None, typer.Option(metavar="HZ,ZETA", help="Compare ω with the rate sensors through their response: 37,0.5")
 ]
+CheckTriax = Annotated[
+    str | None, typer.Option(metavar="PREFIX", help="Predict this extra triax from the others; HIC, GSI deviations.")
+]
 
 
 def motion(
     recording: Recording,
     rig: RigOption,
-    point: Annotated[
-        list[str] | None,
-        typer.Option(metavar="[NAME=]X,Y,Z", help="In the rig's length unit, in place of its points; may be repeated."),
-    ] = None,
-    method: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="map, padgaonkar, ninacc, six-accelerometers, product-free, rates, periphery, co-planar, "
-            "compact-cube, rgla.",
-        ),
-    ] = "map",
-    output: Annotated[
-        Path | None, typer.Option(metavar="F", help="All curves: .csv, .parquet, or .mcap with poses.")
-    ] = None,
-    html: Annotated[Path | None, typer.Option(metavar="F", help="A page with plots.")] = None,
-    omega: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="ω at the first sample, rad/s, if not 0.")] = None,
-    angles: Annotated[str, typer.Option(metavar="Y,P,R", help="Yaw, pitch, roll at first, degrees.")] = "0,0,0",
-    velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m/s.")] = "0,0,0",
-    position: Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m.")] = "0,0,0",
-    gravity: Annotated[
-        bool, typer.Option("--gravity", help="The sensors feel gravity (laboratory +z): put it right by the attitude.")
-    ] = False,
-    check_triax: Annotated[
-        str | None,
-        typer.Option(metavar="PREFIX", help="Predict this extra triax from the others; HIC, GSI deviations."),
-    ] = None,
+    point: Points = None,
+    method: MethodName = "map",
+    output: Curves = None,
+    html: Html = None,
+    omega: Omega = None,
+    angles: Angles = "0,0,0",
+    velocity: Velocity = "0,0,0",
+    position: Position = "0,0,0",
+    gravity: Gravity = False,
+    check_triax: CheckTriax = None,
     worst_case: WorstCase = None,
     gyro_response: GyroResponse = None,
     dbc: Dbc = None,
