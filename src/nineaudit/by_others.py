@@ -19,7 +19,7 @@ from nineaudit.case import Case
 from nineaudit.diagnosis import Candidate, Diagnosis, Status
 from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.estimate.student import StudentFit
-from nineaudit.estimate.suspects import Suspect
+from nineaudit.estimate.suspects import Suspect, still_suspect
 
 
 def by_others(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
@@ -42,6 +42,10 @@ def by_others(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
         return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
     near = [x for x in found if best.claim.evidence - x.claim.evidence < ODDS_NATS]
     names = tuple(dict.fromkeys(case.array.channels[c] for x in near for c in x.channels))
+    if len(near) == 1 and (others := still_suspect(case.student_data, best, found[1:], case.raw_zero)):
+        left = ", ".join(case.array.channels[k] for k in others)
+        reason = f"something is wrong, but not in {' and '.join(names)} alone: without it {left} still cannot be right"
+        return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
     if len(near) == 1:
         fault = candidates[0].fault.replace("_", " ")
         besides = f"; besides, the traces of {', '.join(shown)} are wrong by themselves" if shown else ""

@@ -224,9 +224,13 @@ class Case:
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
         """The channels of a large array with what their readings claim to be, best first."""
+        return suspects(self.student_data, self.student, self.raw_zero)
+
+    @property
+    def raw_zero(self) -> BoolArray:
+        """(m,k) samples of fit_data at which an instrument put out exactly 0."""
         single = self.condensed.length == 1
-        raw_zero = np.equal(self.recording.readings if single else self.condensed.readings, 0.0)
-        return suspects(self.student_data, self.student, raw_zero)
+        return np.equal(self.recording.readings if single else self.condensed.readings, 0.0)
 
     @property
     def student_limit(self) -> float:

@@ -26,6 +26,8 @@ FEW_CHANNELS = 24
 each channel is left out in turn."""
 SUSPECTS, PARTNERS = 4, 4
 """Channels left out of a larger array; channels among which a swap is looked for."""
+RIVALS = 3
+"""Channels that must look right once the best suspect is out."""
 MISFIT = 2.0
 """Mean log(1 + χ²) of a channel over the usual one of its kind at which it is left out in any case."""
 WORTH_NATS = 1.0
@@ -56,6 +58,18 @@ def suspects(data: Data, whole: StudentFit, raw_zero: BoolArray) -> tuple[Suspec
     found.sort(key=lambda x: -x.claim.evidence)
     found += _swaps(data, [x for x in found[:PARTNERS] if x.claim.evidence >= DETECTION_NATS])
     return tuple(sorted(found, key=lambda x: -x.claim.evidence))
+
+
+def still_suspect(data: Data, best: Suspect, others: Sequence[Suspect], raw_zero: BoolArray) -> tuple[int, ...]:
+    """Channels of `others` (the RIVALS best, pairs aside) that a fault still explains with the channels of `best` out
+    of the array as well. A record with one fault has none."""
+    rivals = [x.channels[0] for x in others if len(x.channels) == 1 and x.channels[0] not in best.channels][:RIVALS]
+    out = []
+    for k in rivals:
+        left = _without(data, *best.channels)
+        if _best(left, k, first_fit(_without(left, k)), raw_zero).evidence >= DETECTION_NATS:
+            out.append(k)
+    return tuple(out)
 
 
 def _without(data: Data, *channels: int) -> Data:
