@@ -109,7 +109,9 @@ def test_points_follow_the_rigid_body(healthy):
 def test_text_and_page_hold_every_row(healthy):
     recording, found = healthy
     text = lines(found, recording)
-    assert len(text) == 2 + len(found.rows) + len(found.refused)
+    assert len(text) == 2 + len(found.rows) + len(found.remarks) + len(found.refused)
+    assert any(line.startswith("cross-axis sensitivity, fitted with the motion: rank ") for line in text)
+    assert any(line.startswith("bandwidth of ω: ") and "harmonics" in line for line in text)
     assert text[1].split()[0] == HEADERS[0]
     assert any(line.startswith("not run: periphery: ") for line in text)
     page = render(found, recording)

@@ -95,3 +95,18 @@ def test_a_motion_that_does_not_turn_enough_is_rank_deficient_and_says_so():
     assert not found.determined
     with pytest.raises(EstimationError, match=r"rank \d of 6, by channel \d+ of 18.*rate table"):
         found.require()
+
+
+def test_sensors_with_their_own_small_tilts_are_not_taken_for_a_shared_coupling():
+    """Healthy instruments of the rig's uncertainties, 0.5° each: every entry over its uncertainty is normal.
+
+    Six related entries of twelve records: the rms of their ratios is 1 within a third.
+    """
+    rig, off, ratios = parse_rig(preset_text("naap-3222")), ~np.eye(3, dtype=bool), []
+    for motion in ("general", "oblique"):
+        for seed in range(6):
+            made = simulate(rig, motion, seed=seed, duration_s=0.1)
+            found = takhounts.fit_sensitivity(Case(made.recording).fit_data)
+            ratios.append(found.coupling[off] / found.coupling_sd[off])
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=0.33)
+    assert np.abs(ratios).max() < 4.0

@@ -27,7 +27,7 @@ from nineaudit.estimate import calibration
 from nineaudit.estimate.motion import Motion, bridge
 from nineaudit.physics import filters, rigid_body
 from nineaudit.rig import Point
-from nineaudit.scheme_runs import Scheme, schemes_of
+from nineaudit.scheme_runs import Scheme, remarks, schemes_of
 from nineaudit.schemes import martin, rating
 
 DRAWS: Final = 16
@@ -70,7 +70,7 @@ class Row:
 class Comparison:
     """`curves` by scheme and quantity, each (m,3) SI on `time` (m,) s; `methods` in words; `rows` against
     `reference`; `refused` schemes with the reason; `cfc` of all curves, None: unfiltered. `draws` of the instrument
-    behind the budgets."""
+    behind the budgets. `remarks`: what the motion tells of the sensors besides."""
 
     time: FloatArray
     reference: str
@@ -80,6 +80,7 @@ class Comparison:
     refused: Mapping[str, str]
     cfc: float | None
     draws: int
+    remarks: tuple[str, ...] = ()
 
 
 def compare(
@@ -110,7 +111,8 @@ def compare(
         for axis in range(3)
     ]
     methods = {name: motion.method for name, motion in motions.items()}
-    return Comparison(case.condensed.time, chosen, methods, curves, tuple(rows), refused, class_, len(spread))
+    told = remarks(case, curves[chosen]["omega"])
+    return Comparison(case.condensed.time, chosen, methods, curves, tuple(rows), refused, class_, len(spread), told)
 
 
 def outputs(motion: Motion, points: tuple[Point, ...]) -> dict[str, FloatArray]:

@@ -78,6 +78,40 @@ def schemes_of(case: Case) -> dict[str, Scheme]:
     }
 
 
+def remarks(case: Case, omega: FloatArray) -> tuple[str, ...]:
+    """What this motion tells of the sensors besides, in words: cross-axis sensitivity with its rank, and the bandwidth
+    of `omega` (m,3) rad/s on the blocks."""
+    return _cross_axis(case), _bandwidth(case, omega)
+
+
+def _cross_axis(case: Case) -> str:
+    """[Takhounts09]: his optimisation cannot undo it; a joint fit can, as far as its rank goes."""
+    what = "cross-axis sensitivity, fitted with the motion"
+    try:
+        found = takhounts.fit_sensitivity(case.fit_data)
+    except EstimationError as error:
+        return f"{what}: {error}"
+    rank = f"rank {found.coupling_rank} of 6 (by channel {found.rank} of {found.unknowns})"
+    if not found.determined:
+        return f"{what}: {rank}; this motion does not tell it, and optimising α cannot undo it"
+    significance = np.abs(found.coupling) / np.where(found.coupling_sd > 0.0, found.coupling_sd, 1.0)
+    i, j = divmod(int(np.argmax(significance)), 3)
+    size, u = 100.0 * found.coupling[i, j], 200.0 * found.coupling_sd[i, j]
+    return f"{what}: {rank}; most significant, {'xyz'[j]} in {'xyz'[i]}: {size:.1f} %, U {u:.1f} % (k = 2)"
+
+
+def _bandwidth(case: Case, omega: FloatArray) -> str:
+    """[Hu77]: how many harmonics carry ω, and whether the blocks follow the last of them."""
+    try:
+        found = rgla.bandwidth(omega, case.condensed.time)
+    except EstimationError as error:
+        return f"bandwidth of ω: {error}"
+    enough = "enough" if found.suffices else f"too slow: {found.required:.0f} Hz are needed"
+    part = f"{100 * rgla.HARMONIC_PART:g} %"
+    carried = f"{found.harmonics} harmonics, up to {found.frequency:.0f} Hz, carry {part} of ω"
+    return f"bandwidth of ω: {carried}; compared at {found.rate:.0f} Hz, {enough}"
+
+
 def _accelerometers(array: SensorArray) -> list[int]:
     return [int(i) for i in np.flatnonzero(array.is_accelerometer)]
 

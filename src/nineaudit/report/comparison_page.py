@@ -46,6 +46,7 @@ def lines(comparison: Comparison, recording: Recording) -> list[str]:
     widths = [max(len(line[i]) for line in table) for i in range(len(HEADERS))]
     out = [_heading(comparison, recording)]
     out += ["  ".join(f"{c:<{w}}" for c, w in zip(line, widths, strict=True)).rstrip() for line in table]
+    out += comparison.remarks
     return out + [f"not run: {name}: {reason}" for name, reason in comparison.refused.items()]
 
 
@@ -67,6 +68,7 @@ def render(comparison: Comparison, recording: Recording) -> str:
         "rig": recording.rig.name,
         "sentence": _heading(comparison, recording),
         "reference": comparison.reference,
+        "remarks": comparison.remarks,
         "methods": list(comparison.methods.items()),
         "headers": HEADERS,
         "rows": [(row.explained, cells(row, recording)) for row in comparison.rows],

@@ -124,8 +124,9 @@ def fit_sensitivity(data: Data, prior: float = WIDE) -> Sensitivity:
     """Fit the sensitivity of all accelerometers with the motion; `prior`: the width of a cross-axis sensitivity.
 
     Ranks count the directions in which the motion holds at least as much information as the prior, P − I ≥ TELLING
-    in units of it, P the marginal precision of the tilts. The one matrix is the restriction of the same Gaussian,
-    tilts = B c, to six numbers. EstimationError where ω is not determined.
+    in units of it, P the marginal precision of the tilts. The one matrix follows from the same Gaussian with tilts =
+    B c + δ, six numbers c and each sensor's own δ of the rig's alignment: information Bᵀ((P−I)⁻¹ + u²)⁻¹B.
+    EstimationError where ω is not determined.
     """
     sds = data.prior_sd.copy()
     sds[np.ix_(np.flatnonzero(data.array.is_accelerometer), np.array(_TILTS))] = prior
@@ -136,8 +137,10 @@ def fit_sensitivity(data: Data, prior: float = WIDE) -> Sensitivity:
     precision = np.linalg.inv(covariance[np.ix_(mine, mine)])
     told = precision - np.eye(len(mine))
     basis = _common(found.data, channel[mine], parameter[mine]) / prior
-    shared = basis.T @ told @ basis * prior**2
-    pull = basis.T @ precision @ found.theta[mine] * prior
+    own = (found.data.array.values("u_alignment")[channel[mine]] / prior) ** 2
+    blurred = np.linalg.inv(np.eye(len(mine)) + told * own)
+    shared = basis.T @ blurred @ told @ basis * prior**2
+    pull = basis.T @ blurred @ precision @ found.theta[mine] * prior
     inverse = np.linalg.inv(shared + np.eye(len(_ENTRIES)))
     tilts, sd = np.zeros((len(data.array), 2)), np.zeros((len(data.array), 2))
     place = channel[mine], parameter[mine] - _TILTS[0]
