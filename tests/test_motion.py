@@ -124,6 +124,29 @@ def test_channels_that_contradict_one_another_are_not_passed_over() -> None:
     assert any("nineaudit check" in note for note in motion_of(Case(made.recording), count=0).notes)
 
 
+def test_a_dead_channel_does_not_cost_the_motion() -> None:
+    """Of nine accelerometers and three rate sensors one has no sample: the others tell the motion as well, nearly."""
+    made = simulate(rig_of("naap-gyro"), "general", seed=3)
+    readings = made.recording.readings.copy()
+    readings[:, 3] = np.nan
+    case = Case(replace(made.recording, readings=readings, valid=np.isfinite(readings)))
+    got = motion_of(case)
+    error, size = got.paths["CG"].a_body - path_of(made).a_body, np.abs(path_of(made).a_body).max()
+    assert np.sqrt((error**2).mean()) < 0.01 * size
+    assert np.isfinite(got.u["CG a"]).all()
+    with pytest.raises(EstimationError, match="has no valid sample"):
+        motion_of(case, "padgaonkar")
+
+
+def test_eight_accelerometers_are_enough_for_least_squares() -> None:
+    """A perfect 3-2-2-2 array less one channel: H has rank 6 still, and the feedback adds no error of its own."""
+    made = simulate(rig_of("naap-3222"), "general", seed=2, imperfect=False, noise=False)
+    readings = made.recording.readings.copy()
+    readings[:, 3] = np.nan
+    got = motion_of(Case(replace(made.recording, readings=readings, valid=np.isfinite(readings))), "ninacc")
+    assert np.abs(got.omega - made.truth.omega).max() < 2e-3 * np.abs(made.truth.omega).max()
+
+
 # Uncertainty
 
 

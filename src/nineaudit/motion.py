@@ -211,9 +211,6 @@ def _notes(case: Case, start: Start, at: Samples | None) -> tuple[str, ...]:
         if rest is None
         else f"zero taken off over {case.time[rest.start]:.4g} to {case.time[rest.stop - 1]:.4g} s"
     )
-    pull = (
-        "gravity put right by the initial orientation"
-        if start.gravity
-        else "gravity left as the zero leaves it (up to 2 g when the body turns over; see --gravity)"
-    )
+    left = "as it is in the readings" if rest is None else "as the zero leaves it, up to 2 g when the body turns over"
+    pull = "gravity put right by the initial orientation" if start.gravity else f"gravity left {left} (see --gravity)"
     return (*doubts, zero, pull)

@@ -82,7 +82,7 @@ def _padgaonkar(case: Case, start: Start) -> Motion:
 
 
 def _product_free(case: Case, start: Start) -> Motion:
-    held = case.array.is_accelerometer
+    held = _live(case)
     y = bridge(case.readings[:, held], case.time)
     omega0, rest = _beginning(case, start)
     return _integrated(case.array.positions[held], case.array.axes[held], y, case.time, omega0, rest)
@@ -101,9 +101,14 @@ def _integrated(
 
 
 def _ninacc(case: Case, start: Start) -> Motion:
-    held = case.array.is_accelerometer
+    held = _live(case)
     omega0, _ = _beginning(case, start)
-    return ninacc.forward(case.array, case.time, case.readings, omega0, case.sigma[held] ** 2)
+    return ninacc.forward(case.array.select(held), case.time, case.readings[:, held], omega0, case.sigma[held] ** 2)
+
+
+def _live(case: Case) -> list[int]:
+    """Columns of the accelerometers that have a valid sample."""
+    return np.flatnonzero(case.array.is_accelerometer & case.valid.any(axis=0)).tolist()
 
 
 def _six_accelerometers(case: Case, start: Start) -> Motion:

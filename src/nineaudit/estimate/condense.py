@@ -69,19 +69,22 @@ def block_noise(sigma: FloatArray, rest: FloatArray | None, length: int, filtere
 
     `rest` (r,k) zeroed samples of the quiet interval or None; `filtered` what a known filter makes of white noise,
     filters.mean_noise(). The inflation, variance of block means over σ²/length, found at rest is the median of the
-    channels (one bad channel does not count), the better known the more blocks it has. What is expected of the filter,
-    or of white noise, counts as known to KNOWN_FILTER or UNKNOWN_FILTER (of its logarithm); the two are weighed by
-    their precisions. Never below 1.
+    live channels (one bad channel does not count), the better known the more blocks it has. What is expected of the
+    filter, or of white noise, counts as known to KNOWN_FILTER or UNKNOWN_FILTER (of its logarithm); the two are weighed
+    by their precisions. Never below 1.
     """
     white = sigma / np.sqrt(length)
     expected, known = (1.0, UNKNOWN_FILTER) if filtered is None else (filtered, KNOWN_FILTER)
     blocks = 0 if rest is None else len(rest) // length
     if rest is None or blocks < ENOUGH_BLOCKS:
         return np.asarray(white * np.sqrt(expected))
-    free = blocks - 1
-    ratio = np.nanvar(block_means(rest, length), axis=0, ddof=1) / white**2
+    free, means = blocks - 1, block_means(rest, length)
+    alive = np.isfinite(means).sum(axis=0) > blocks // 2
+    if not alive.any():
+        return np.asarray(white * np.sqrt(expected))
+    ratio = np.nanvar(means[:, alive], axis=0, ddof=1) / white[alive] ** 2
     median = float(np.median(ratio)) / (1.0 - 2.0 / (9.0 * free)) ** 3  # the median of χ²/ν, Wilson and Hilferty 1931
-    measured = MEDIAN_SPREAD * np.sqrt(2.0 / (free * len(sigma)))
+    measured = MEDIAN_SPREAD * np.sqrt(2.0 / (free * int(alive.sum())))
     weight = known**2 / (known**2 + measured**2)
     log_inflation = weight * np.log(max(median, 1e-6)) + (1.0 - weight) * np.log(expected)
     return np.asarray(white * np.sqrt(max(float(np.exp(log_inflation)), 1.0)))
