@@ -12,7 +12,7 @@ from nineaudit.errors import EstimationError
 from nineaudit.physics.filters import response
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.schemes import martin
-from nineaudit.selftest import martin98
+from nineaudit.selftest import martin98, not_reproducible, record
 from nineaudit.simulate import simulate
 
 RATES = '[[sensor]]\nchannel = "{0}"\nkind = "gyroscope"\nposition = [0.0, 0.0, 0.0]\naxis = {1}\n'
@@ -124,3 +124,9 @@ def test_error_propagation_agrees_with_its_formula_and_with_simulation():
     assert total[0] == pytest.approx(np.hypot(0.09, 0.24))
     x, y = np.random.default_rng(0).standard_normal((2, 20_000)) * [[0.01], [0.02]] + [[2.0], [3.0]]
     assert (x * y**2).std() == pytest.approx(total[0], rel=0.03)
+
+
+def test_the_validation_record_names_what_nobody_can_reproduce():
+    text = "\n".join(record.lines(martin98.checks(), "2026-01-31", not_reproducible()))
+    assert "Not reproducible from what is printed\n  Martin 1998 Table 4, peripheral α: 7.30, 0.93 and 24.7 %" in text
+    assert record.document([], "2026-01-31", not_reproducible())["not_reproducible"] == not_reproducible()

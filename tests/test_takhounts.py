@@ -12,7 +12,7 @@ from nineaudit.errors import EstimationError
 from nineaudit.physics import rigid_body
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.schemes import takhounts
-from nineaudit.selftest import takhounts09
+from nineaudit.selftest import takhounts09, takhounts_misprints
 from nineaudit.selftest.takhounts09 import triangle
 from nineaudit.simulate import simulate
 
@@ -20,7 +20,9 @@ C = 0.03
 COUPLING = C * (1.0 - np.eye(3))
 
 
-@pytest.mark.parametrize("check", takhounts09.checks(), ids=lambda check: check.quantity)
+@pytest.mark.parametrize(
+    "check", [*takhounts09.checks(), *takhounts_misprints.checks()], ids=lambda check: check.quantity
+)
 def test_published_numbers(check):
     assert check.passed, check
 

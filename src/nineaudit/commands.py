@@ -117,13 +117,13 @@ def budgeted(
 
 def selftested(date: str | None = None, json: Path | None = None) -> tuple[list[str], bool]:
     """The validation record as lines, and whether every published number came out."""
-    from nineaudit.selftest import all_checks, record
+    from nineaudit.selftest import all_checks, not_reproducible, record
 
     when = record.day(date)
-    checks = all_checks()
+    checks, absent = all_checks(), not_reproducible()
     if json is not None:
-        write_text(json, as_json(record.document(checks, when)) + "\n")
-    return record.lines(checks, when), all(check.passed for check in checks)
+        write_text(json, as_json(record.document(checks, when, absent)) + "\n")
+    return record.lines(checks, when, absent), all(check.passed for check in checks)
 
 
 def compared(

@@ -36,8 +36,9 @@ def versions() -> dict[str, str]:
     return found | {"Python": platform.python_version(), "system": f"{platform.system()} {platform.machine()}"}
 
 
-def lines(checks: Sequence[Published], when: str) -> list[str]:
-    """The record as text, a block for each source. A tolerance's reason stands under the numbers it is for."""
+def lines(checks: Sequence[Published], when: str, absent: Sequence[str] = ()) -> list[str]:
+    """The record as text, a block for each source. A tolerance's reason stands under the numbers it is for; `absent`:
+    published numbers that cannot be reproduced by anybody, each with why."""
     rows = {check: _row(check) for check in checks}
     widths = [max(len(row[i]) for row in (*rows.values(), _COLUMNS)) for i in range(len(_COLUMNS))]
     head = [f"Validation record of nineaudit {version('nineaudit')}, {when}"]
@@ -49,6 +50,7 @@ def lines(checks: Sequence[Published], when: str) -> list[str]:
         for reason in dict.fromkeys(check.why for check in of_source):
             body += [_line(rows[check], widths) for check in of_source if check.why == reason]
             body.append(f"    tolerance: {reason}")
+    body += ["", "Not reproducible from what is printed", *(f"  {text}" for text in absent)] if absent else []
     return [*head, *body, "", summary(checks), "", "Checked by: ____________________   Date: ____________"]
 
 
@@ -59,7 +61,7 @@ def summary(checks: Sequence[Published]) -> str:
     return f"{said}; not: {'; '.join(missed)}" if missed else said
 
 
-def document(checks: Sequence[Published], when: str) -> dict[str, Any]:
+def document(checks: Sequence[Published], when: str, absent: Sequence[str] = ()) -> dict[str, Any]:
     """The record for machines, every number at full precision."""
     names = ("source", "quantity", "printed", "expected", "ours", "tolerance", "why", "passed")
     return {
@@ -68,6 +70,7 @@ def document(checks: Sequence[Published], when: str) -> dict[str, Any]:
         "versions": versions(),
         "passed": all(check.passed for check in checks),
         "checks": [{name: getattr(check, name) for name in names} for check in checks],
+        "not_reproducible": list(absent),
     }
 
 
