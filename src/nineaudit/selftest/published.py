@@ -24,4 +24,4 @@ class Published:
     @property
     def passed(self) -> bool:
         """Whether ours is within the tolerance of what is expected; a number that is not one never is."""
-        return abs(self.ours - self.expected) <= self.tolerance
+        return bool(abs(self.ours - self.expected) <= self.tolerance)
