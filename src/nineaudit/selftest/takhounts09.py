@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +13,14 @@ from nineaudit.schemes import takhounts
 from nineaudit.selftest.published import Published
 from nineaudit.selftest.takhounts_misprints import SOURCE, relative
 
+if TYPE_CHECKING:
+    from nineaudit.auditing import Audit
+    from nineaudit.simulate import Truth
+
 
 def checks() -> list[Published]:
     """Counter-example (eqs 15–20), clipping, eq 37 row 2, and what 3 % cross-axis does to α."""
-    return [*_counter_example(), *_clipping(), *_triangle(), *_cross_axis()]
+    return [*_counter_example(), *_clipping(), _planar(), *_triangle(), *_cross_axis()]
 
 
 def _counter_example() -> list[Published]:
@@ -40,8 +45,8 @@ def _counter_example() -> list[Published]:
     ]
 
 
-def _clipping() -> list[Published]:
-    """METHODS 7.4: a1y clipped at half its amplitude in general motion, 0.3 g noise, no calibration error."""
+def _clipped(channel: str, motion: str) -> tuple[Audit, Truth]:
+    """The audit of a recording whose `channel` is clipped at half its amplitude: 0.3 g noise, no calibration error."""
     from nineaudit.auditing import audit
     from nineaudit.rig import parse_rig, preset_text
     from nineaudit.simulate import simulate
@@ -51,18 +56,30 @@ def _clipping() -> list[Published]:
         replace(s, u_gain=0.0, u_zero=0.0, u_alignment=0.0, u_position=0.0, u_timing=0.0) for s in rig.array.sensors
     )
     rig = replace(rig, array=SensorArray(certain))
-    made = simulate(rig, "general", faults=["a1y:clipping=0.5"], seed=0, imperfect=False)
-    found = audit(made.recording)
+    made = simulate(rig, motion, faults=[f"{channel}:clipping=0.5"], seed=0, imperfect=False)
+    return audit(made.recording), made.truth
+
+
+def _planar() -> Published:
+    """METHODS 7.4 and 3: about y the twins a3x and a1z cannot be told apart, and both are reported."""
+    found, _ = _clipped("a3x", "planar")
+    reported = float(set(found.diagnosis.channels) == {"a3x", "a1z"})
+    label = "clipped a3x, planar motion about y: the twins a3x and a1z reported (1 yes)"
+    return Published(SOURCE, label, "not said", reported, 1.0, 0.5, "yes or no, half way between")
+
+
+def _clipping() -> list[Published]:
+    """METHODS 7.4: a1y in general motion."""
+    found, truth = _clipped("a1y", "general")
+    rig = found.recording.rig
     best, following = found.diagnosis.candidates[:2]
     columns, arms = nap.layout(rig.array) or ((), np.ones(3))
-    before = made.recording.readings - found.case.zero
+    before = found.recording.readings - found.case.zero
     after = before.copy()
     if found.reconstruction is not None:
         after[:, [rig.array.index(c) for c in found.reconstruction.channels]] = found.reconstruction.repaired
-    peak = np.linalg.norm(made.truth.alpha, axis=1).max()
-    errors = [
-        100.0 * float(np.abs(nap.alpha(y[:, columns], arms) - made.truth.alpha).max() / peak) for y in (before, after)
-    ]
+    peak = np.linalg.norm(truth.alpha, axis=1).max()
+    errors = [100.0 * float(np.abs(nap.alpha(y[:, columns], arms) - truth.alpha).max() / peak) for y in (before, after)]
     named = float(found.diagnosis.channels == ("a1y",))
     size = "the spread over records that METHODS 7.4 gives"
     return [
