@@ -157,3 +157,12 @@ def test_an_array_whose_accelerometers_do_not_tell_alpha_is_compared_by_its_rate
     assert found.reference == "rates"
     assert set(found.curves) == {"rates", "compact-cube", "rgla"}
     assert "rank 3" in found.refused["map"]
+
+
+def test_a_class_that_the_recording_has_been_through_is_refused():
+    """A second CFC180 takes another 3 dB at its corner. Unasked, curves then stay as they are."""
+    rig = parse_rig(preset_text("naap-gyro").replace('"CFC1000"', '"CFC180"'))
+    case = Case(simulate(rig, "drop", seed=1, rate_hz=20_000.0).recording)
+    with pytest.raises(ConfigurationError, match="filtered twice: CFC180 after CFC180"):
+        compare(case, draws=2, cfc=180.0)
+    assert compare(case, draws=2).cfc is None

@@ -90,11 +90,12 @@ def compare(
     or else the first that runs. `cfc` of the curves: None is CLASS, unfiltered where that is too fast; 0 unfiltered.
 
     Raises ConfigurationError for a reference that is no scheme or does not run, or fewer than two draws;
-    EstimationError where fewer than two schemes run, or the blocks are too slow for a class that is asked for.
+    EstimationError where fewer than two schemes run, or the blocks are too slow for a class that is asked for; also
+    ConfigurationError for a class that the recording has been through.
     """
     if draws < 2:
         raise ConfigurationError("too few draws", place="--draws", found=draws, expected="2 or more")
-    class_ = _class(case.condensed.time, cfc)
+    class_ = _class(case, cfc)
     schemes = {name: _filtered(scheme, case.condensed.time, class_) for name, scheme in schemes_of(case).items()}
     readings = bridge(case.condensed.readings, case.condensed.time)
     motions, refused = _run(schemes, readings)
@@ -126,11 +127,15 @@ def unit_of(quantity: str) -> str:
     return {"alpha": "rad/s^2", "omega": "rad/s"}.get(quantity, "m/s^2")
 
 
-def _class(time: FloatArray, cfc: float | None) -> float | None:
+def _class(case: Case, cfc: float | None) -> float | None:
+    """The class of the curves: what is asked for, else CLASS where the samples are fast enough and a filter as recorded
+    leaves room for it."""
+    rate, already = _rate(case.condensed.time), case.recording.rig.cfc
     if cfc is None:
-        return CLASS if filters.fast_enough(_rate(time), CLASS) else None
+        return CLASS if filters.fast_enough(rate, CLASS) and (already is None or already > CLASS) else None
     if cfc != 0.0:
-        filters.coefficients(cfc, _rate(time))
+        filters.coefficients(cfc, rate)
+        filters.require_room(case.recording.rate, cfc, already)
     return cfc or None
 
 

@@ -150,18 +150,24 @@ def once(
 
     ConfigurationError where `already` has taken more than LOSS_DB at the corner of `class_`; else as `cfc`.
     """
-    if already is not None:
-        edge = corner(class_, rate, standard)
-        warped = math.tan(math.pi * edge / rate) / math.tan(math.pi * already * _DESIGN_FACTOR[standard] / rate)
-        lost = 20.0 * math.log10(1.0 + warped**4) if fast_enough(rate, already) else 0.0
-        if lost > LOSS_DB:
-            raise ConfigurationError(
-                f"filtered twice: CFC{class_:g} after CFC{already:g} leaves −{lost + 3.01:.1f} dB at {edge:.0f} Hz",
-                found=f"a recording of CFC{already:g}",
-                expected="−3 dB there, of one filter",
-                advice="take the recording as it is, or start from unfiltered data",
-            )
+    require_room(rate, class_, already, standard)
     return cfc(values, rate, class_, standard)
+
+
+def require_room(rate: float, class_: float, already: float | None, standard: Standard = "J211") -> None:
+    """ConfigurationError where a filter of class `already` (None: none) leaves no room for one of `class_`."""
+    if already is None or not fast_enough(rate, already):
+        return
+    edge = corner(class_, rate, standard)
+    warped = math.tan(math.pi * edge / rate) / math.tan(math.pi * already * _DESIGN_FACTOR[standard] / rate)
+    lost = 20.0 * math.log10(1.0 + warped**4)
+    if lost > LOSS_DB:
+        raise ConfigurationError(
+            f"filtered twice: CFC{class_:g} after CFC{already:g} leaves −{lost + 3.01:.1f} dB at {edge:.0f} Hz",
+            found=f"a recording of CFC{already:g}",
+            expected="−3 dB there, of one filter",
+            advice="take the recording as it is, or start from unfiltered data",
+        )
 
 
 def _one_pass(x: FloatArray, b: tuple[float, float, float], a: tuple[float, float]) -> FloatArray:
