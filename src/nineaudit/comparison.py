@@ -134,8 +134,8 @@ def _class(case: Case, cfc: float | None) -> float | None:
     if cfc is None:
         return CLASS if filters.fast_enough(rate, CLASS) and (already is None or already > CLASS) else None
     if cfc != 0.0:
-        filters.coefficients(cfc, rate)
         filters.require_room(case.recording.rate, cfc, already)
+        filters.coefficients(cfc, rate)
     return cfc or None
 
 
