@@ -469,3 +469,12 @@ def test_points_are_in_the_rigs_length_unit_and_take_the_place_of_its_own() -> N
 def test_acceleration_of_a_point_is_that_of_the_rigid_body(found: Kinematics) -> None:
     expected = rigid_body.acceleration_at(POINT, found.a0, found.alpha, found.omega)
     np.testing.assert_allclose(found.paths["CG"].a_body, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_fit_that_would_leave_alpha_to_differences_of_omega_is_refused():
+    """Three rate sensors and a triax: nodes of ω may zigzag unseen, and α with them (128,000 rad/s² for 3,600)."""
+    rig = parse_rig(preset_text("rgla"))
+    case = Case(simulate(rig, "general", seed=0).recording)
+    with pytest.raises(EstimationError, match="do not tell α"):
+        motion_of(case)
+    assert np.abs(motion_of(case, "rates").alpha).max() < 10_000

@@ -12,7 +12,7 @@ import numpy as np
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
-from nineaudit.estimate import trajectory
+from nineaudit.estimate import parity, trajectory
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, estimate_motion, has_rates
 from nineaudit.estimate.samples import Samples, at_samples
 from nineaudit.physics import kinematics, nap, rigid_body
@@ -42,7 +42,15 @@ def by_fit(case: Case, start: Start) -> Samples:
     """Whole-record maximum a posteriori fit (METHODS.md 2), a0 and α from each sample.
 
     A stated ω(0) is where the fit starts from, for records without a quiet interval; the readings decide.
+    EstimationError where the accelerometers do not tell α: differences of ω would be all that is left of it.
     """
+    if not parity.tells_alpha(case.array):
+        rates = has_rates(case.array)
+        raise EstimationError(
+            "the accelerometers do not tell α, and the fit leaves it to differences of ω",
+            expected="accelerometers of rank 6",
+            advice="use --method rates" if rates else "see nineaudit budget for what the array can tell",
+        )
     found = case.healthy if start.omega is None else trajectory.fit(case.fit_data, _from(case, start.omega))
     return at_samples(found, case.time, case.readings, case.sigma)
 

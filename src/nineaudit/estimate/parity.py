@@ -26,14 +26,17 @@ def redundancy(array: SensorArray) -> tuple[int, int]:
     return spare, int((~accelerometers).sum()) - 3 if has_rates(array) else 0
 
 
+def tells_alpha(array: SensorArray) -> bool:
+    """Whether the accelerometers tell α and a0 at one instant, ω being known: rank 6 of H."""
+    held = array.is_accelerometer
+    design = rigid_body.design(array.positions[held], array.axes[held])
+    return len(design) > 0 and int(np.linalg.matrix_rank(design, tol=1e-6)) == 6
+
+
 def redundant(array: SensorArray) -> bool:
     """Whether a record can contradict itself: at one instant, or over time, by dω/dt = α of rate sensors on three axes
     and accelerometers that tell α."""
-    held = array.is_accelerometer
-    if sum(redundancy(array)) > 0:
-        return True
-    design = rigid_body.design(array.positions[held], array.axes[held])
-    return has_rates(array) and len(design) > 0 and int(np.linalg.matrix_rank(design, tol=1e-6)) == 6
+    return sum(redundancy(array)) > 0 or (has_rates(array) and tells_alpha(array))
 
 
 @dataclass(frozen=True, eq=False)
