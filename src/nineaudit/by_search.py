@@ -32,6 +32,8 @@ DECISIVE = ("dropout", "stuck", "spikes")
 WAVEFORMS = ("unknown", "samples")
 DEAD = 0.1
 """Gain factor under which a channel measures nothing of the motion."""
+FARTHEST = {"position": 25e-3, "cross_axis": 0.3}
+"""m, and sensitivity, beyond which these kinds are any waveform: a sensor 50 mm off, at the origin, feels no α."""
 UNIT_FACTORS = (9.80665, 57.29578, 1000.0, 100.0, 25.4, 2.54, 0.3048 * 9.80665)
 
 
@@ -130,8 +132,10 @@ def _group(search: Search, best: Hypothesis, floor: float) -> list[tuple[int, ..
 
 def _is_waveform(search: Search, best: Hypothesis) -> bool:
     """Whether a hypothesis says no more than that its channel has another waveform: it is free, it is dead (a gain near
-    0), or its kind of fault leaves more than the free waveform does, by more than chance (3 σ of χ²)."""
+    0, a place far off), or its kind of fault leaves more than the free waveform, by more than chance (3 σ of χ²)."""
     if best.word in WAVEFORMS or abs(best.parameters.get("factor", 1.0)) < DEAD:
+        return True
+    if best.parameters.get("size", 0.0) > FARTHEST.get(best.word, np.inf):
         return True
     dof, free = search.healthy.data.dof, search.without[best.channels[0]]
     count = int((search.healthy.data.weight[:, best.channels[0]] > 0).sum())
