@@ -16,7 +16,8 @@ from nineaudit.budgets.ambiguity import ambiguity
 from nineaudit.budgets.monte_carlo import scatter
 from nineaudit.case import Case
 from nineaudit.estimate import trajectory
-from nineaudit.estimate.at_their_word import SOURCES, Word, at_their_word, total
+from nineaudit.estimate.at_their_word import Word, at_their_word, total
+from nineaudit.estimate.calibration import SOURCES
 from nineaudit.estimate.functional import Smoothed, smoothed
 from nineaudit.estimate.motion import Motion, estimate_motion
 from nineaudit.estimate.outputs import Output, at_instant, outputs

@@ -31,8 +31,6 @@ from nineaudit.recording import Recording
 
 CFC_TO_PASS_BAND = 0.6
 """CFC number over its −3 dB frequency: the class is 1000 for 1650 Hz (SAE J211-1)."""
-DOUBTFUL = 3.0
-"""Cost over its limit up to which the linear closed forms are doubted."""
 NOMINAL_NOISE = 1e-3
 """Last resort for a noise level, as a part of the channel's peak, where neither rig nor recording tells."""
 
@@ -242,11 +240,6 @@ class Case:
         """Cost per degree of freedom of the record with every channel at its word. EstimationError where the motion
         cannot be told."""
         return self.healthy.statistic
-
-    @property
-    def closed_forms_apply(self) -> bool:
-        """Whether the array is an ideal 3-2-2-2 and nothing else."""
-        return self.nap_layout is not None and bool(self.array.is_accelerometer.all())
 
     @property
     def flagged_blocks(self) -> BoolArray:

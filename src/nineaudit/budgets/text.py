@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from nineaudit.array import Sensor
 from nineaudit.budgets.ambiguity import Groups
 from nineaudit.budgets.compute import Budget, Line, Rows
-from nineaudit.estimate.at_their_word import SOURCES, total
+from nineaudit.estimate.at_their_word import total
+from nineaudit.estimate.calibration import SOURCES
 from nineaudit.units import display
 
 _SPELLED = {"rad/s^2": "rad/s²", "g_0": "g", "g_0^2.5 s": "", "1": ""}

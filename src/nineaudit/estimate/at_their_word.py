@@ -25,15 +25,6 @@ from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, estimate_motion
 from nineaudit.estimate.outputs import Gradient
 from nineaudit.physics import kinematics, rigid_body
 
-SOURCES = {
-    "gain": ("gain",),
-    "zero": ("zero",),
-    "alignment": ("tilt_1", "tilt_2"),
-    "position": ("position_x", "position_y", "position_z"),
-    "timing": ("timing",),
-}
-"""The rows of a budget, and the calibration errors that each holds; noise is the last row."""
-
 
 @dataclass(frozen=True, eq=False)
 class Word:
@@ -82,7 +73,7 @@ class Word:
         parts = np.matmul(by_reading.T[:, None, :], self.columns)[:, 0]
         out = {
             source: float(np.linalg.norm(parts[:, [calibration.PARAMETERS.index(m) for m in members]]))
-            for source, members in SOURCES.items()
+            for source, members in calibration.SOURCES.items()
         }
         return out | {"noise": float(np.sqrt((by_reading**2 @ self.sigma**2).sum()))}
 

@@ -16,14 +16,6 @@ from nineaudit.estimate import calibration
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, has_rates
 from nineaudit.physics import rigid_body
 
-_MEMBERS = {
-    "gain": ("gain",),
-    "zero": ("zero",),
-    "alignment": ("tilt_1", "tilt_2"),
-    "position": ("position_x", "position_y", "position_z"),
-    "timing": ("timing",),
-}
-
 
 @dataclass(frozen=True, eq=False)
 class AlphaBudget:
@@ -60,7 +52,7 @@ def alpha_budget(
     reach = (combination**2).sum(axis=0)
     parts = {
         source: float(np.sqrt(sum(reach @ patterns[:, calibration.PARAMETERS.index(m)] ** 2 for m in members)))
-        for source, members in _MEMBERS.items()
+        for source, members in calibration.SOURCES.items()
     }
     parts["noise"] = float(np.sqrt(reach @ sigma[array.is_accelerometer] ** 2))
     total = float(np.sqrt(sum(v**2 for v in parts.values())))

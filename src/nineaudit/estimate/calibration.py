@@ -21,6 +21,14 @@ from nineaudit.estimate.motion import Motion
 from nineaudit.physics import kinematics
 
 PARAMETERS = ("gain", "zero", "tilt_1", "tilt_2", "position_x", "position_y", "position_z", "timing")
+SOURCES = {
+    "gain": ("gain",),
+    "zero": ("zero",),
+    "alignment": ("tilt_1", "tilt_2"),
+    "position": ("position_x", "position_y", "position_z"),
+    "timing": ("timing",),
+}
+"""The rows of a budget, and the calibration errors that each holds; noise is the last row."""
 
 
 def perpendicular(axis: FloatArray) -> FloatArray:

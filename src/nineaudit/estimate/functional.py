@@ -17,7 +17,6 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.estimate import calibration
-from nineaudit.estimate.at_their_word import SOURCES
 from nineaudit.estimate.motion import Motion
 from nineaudit.estimate.normal import Solved, eliminate, normal_equations
 from nineaudit.estimate.outputs import Gradient
@@ -59,7 +58,7 @@ class Smoothed:
     def _by_source(self, left: FloatArray, variance: float) -> dict[str, float]:
         parameter = self.known.fit.data.active[1]
         out = {}
-        for source, members in SOURCES.items():
+        for source, members in calibration.SOURCES.items():
             mine = np.isin(parameter, [calibration.PARAMETERS.index(m) for m in members])
             out[source] = float(np.linalg.norm(left[: len(parameter)][mine]))
         noise = variance - sum(value**2 for value in out.values())
