@@ -19,7 +19,7 @@ from nineaudit.estimate.claims import Claim, claims, taken_for
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.prediction import predict
 from nineaudit.estimate.separation import DETECTION_NATS
-from nineaudit.estimate.student import StudentFit, first_fit
+from nineaudit.estimate.student import StudentFit, first_fit, refit
 
 FEW_CHANNELS = 24
 """Up to so many channels a fault bends the fit so far that a first look, with the channel still in it, says little:
@@ -67,9 +67,15 @@ def still_suspect(data: Data, best: Suspect, others: Sequence[Suspect], raw_zero
     out = []
     for k in rivals:
         left = _without(data, *best.channels)
-        if _best(left, k, first_fit(_without(left, k)), raw_zero).evidence >= DETECTION_NATS:
+        if _best(left, k, _settled(_without(left, k), best.without), raw_zero).evidence >= DETECTION_NATS:
             out.append(k)
     return tuple(out)
+
+
+def _settled(data: Data, near: StudentFit) -> StudentFit:
+    """The fit from the rate sensors; where that does not converge, the one from where a fit with more channels was."""
+    fresh = first_fit(data)
+    return fresh if fresh.converged else refit(data, near)
 
 
 def _without(data: Data, *channels: int) -> Data:
