@@ -37,7 +37,10 @@ MethodName = Annotated[
         "rgla.",
     ),
 ]
-Curves = Annotated[Path | None, typer.Option(metavar="F", help="All curves: .csv, .parquet, or .mcap with poses.")]
+Curves = Annotated[
+    Path | None,
+    typer.Option(metavar="F", help="All curves: .csv, .parquet, .mcap with poses, .blf or .asc with a database."),
+]
 Html = Annotated[Path | None, typer.Option(metavar="F", help="A page with plots.")]
 Omega = Annotated[str | None, typer.Option(metavar="X,Y,Z", help="ω at the first sample, rad/s, if not 0.")]
 Angles = Annotated[str, typer.Option(metavar="Y,P,R", help="Yaw, pitch, roll at first, degrees.")]
@@ -84,7 +87,7 @@ def motion(
     """
     from nineaudit.case import Case
     from nineaudit.motion import motion_of
-    from nineaudit.motion_files import writer_of
+    from nineaudit.motion_files import files_of, writer_of
     from nineaudit.motion_methods import method_named
     from nineaudit.outputs import protect, require_absent
     from nineaudit.readers import read
@@ -92,10 +95,12 @@ def motion(
 
     method_named(method)
     instrument = load_rig(rig)
-    protect([output, html], [recording, rig, *(dbc or instrument.dbc)])
+    outputs = () if output is None else files_of(output)
+    protect([*outputs, html], [recording, rig, *(dbc or instrument.dbc)])
     if output is not None:
         writer_of(output)
-        require_absent(output, force)
+    for place in outputs:
+        require_absent(place, force)
     instrument = with_points(instrument, point or [])
     start = _start(omega, angles, velocity, position, gravity)
     case = Case(read(recording, instrument, dbc=dbc or ()))
@@ -208,10 +213,11 @@ def _written(
 ) -> list[str]:
     said = []
     if output is not None:
-        from nineaudit.motion_files import write_motion
+        from nineaudit.motion_files import files_of, write_motion
 
-        write_motion(found, output, force)
-        said.append(f"{output}: {len(found.time)} samples of every curve, SI units")
+        notes = write_motion(found, output, force)
+        said.append("; ".join([f"{output}: {len(found.time)} samples of every curve, SI units", *notes]))
+        said += [f"{database}: its database" for database in files_of(output)[1:]]
     if html is not None:
         from nineaudit.outputs import write_text
         from nineaudit.report.motion_page import render_motion

@@ -1,4 +1,5 @@
-"""A motion as a file: a table (CSV, Parquet) with SI units in the names of its columns, or MCAP with poses.
+"""A motion as a file: a table (CSV, Parquet) with SI units in the names of its columns, MCAP with poses, or a CAN log
+(motion_can.py) with its database beside it.
 
 An MCAP file has, for Foxglove, the topics /tf (foxglove.FrameTransform, laboratory to body) and /pose/NAME
 (foxglove.PoseInFrame) for every point, and with all numbers /motion and /point/NAME. Log times cannot be negative: a
@@ -16,11 +17,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from nineaudit import motion_can
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError
 from nineaudit.motion import Kinematics
 from nineaudit.signals import MCAP_ORIGIN, suggestion
 
+Writer = Callable[[Kinematics, Path], tuple[str, ...]]
+"""Writes a motion to a file and returns notes on what its format changed."""
 LABORATORY, BODY = "laboratory", "body"
 _U = {"omega": "u_omega_{}_rad_s", "alpha": "u_alpha_{}_rad_s2", "attitude": "u_attitude_{}_rad"}
 _POINT = {
@@ -49,26 +53,36 @@ def _split(pattern: str, values: FloatArray, letters: str = "xyz") -> dict[str, 
     return {pattern.format(letter): values[:, i] for i, letter in enumerate(letters)}
 
 
-def write_motion(found: Kinematics, path: Path, force: bool = False) -> None:
-    """Write the motion in the format of the path's suffix, whole or not at all. ConfigurationError: unknown suffix, the
-    file exists (unless `force`), or it cannot be written."""
-    writer = writer_of(path)
-    if path.exists() and not force:
-        raise ConfigurationError(
-            "the file exists", file=path, advice="choose another name, or overwrite it with --force"
-        )
-    partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+def files_of(path: Path) -> tuple[Path, ...]:
+    """What a motion is written to: the file, and of a CAN log the database that describes it, beside it."""
+    return (path, path.with_suffix(".dbc")) if path.suffix.lower() in motion_can.SUFFIXES else (path,)
+
+
+def write_motion(found: Kinematics, path: Path, force: bool = False) -> tuple[str, ...]:
+    """Write the motion in the format of the path's suffix, to `files_of` it, each whole or not at all; returns notes on
+    what the format changed. ConfigurationError: unknown suffix, a file exists (unless `force`), or cannot be written.
+    """
+    writer, places = writer_of(path), files_of(path)
+    for place in places:
+        if place.exists() and not force:
+            raise ConfigurationError(
+                "the file exists", file=place, advice="choose another name, or overwrite it with --force"
+            )
+    partial = [place.with_name(f".{place.stem}.{os.getpid()}{place.suffix}") for place in places]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        writer(found, partial)
-        os.replace(partial, path)
+        notes = writer(found, partial[0])
+        for part, place in zip(partial, places, strict=True):
+            os.replace(part, place)
     except OSError as error:
         raise ConfigurationError(f"cannot be written: {error.strerror or error}", file=path) from error
     finally:
-        partial.unlink(missing_ok=True)
+        for part in partial:
+            part.unlink(missing_ok=True)
+    return notes
 
 
-def writer_of(path: Path) -> Callable[[Kinematics, Path], None]:
+def writer_of(path: Path) -> Writer:
     """The writer for the path's suffix; ConfigurationError names those there are."""
     suffix = path.suffix.lower()
     if suffix not in WRITERS:
@@ -82,7 +96,14 @@ def writer_of(path: Path) -> Callable[[Kinematics, Path], None]:
     return WRITERS[suffix]
 
 
-def _write_csv(found: Kinematics, path: Path) -> None:
+def _write_can(found: Kinematics, path: Path) -> tuple[str, ...]:
+    """A CAN log, and its database by the name that `files_of` gives."""
+    error = motion_can.write_log(found, path, path.with_suffix(".dbc")).error
+    worst = max(error, key=lambda signal: error[signal])
+    return (f"its bits round off up to {error[worst]:.2g} (SI), most in {worst}",)
+
+
+def _write_csv(found: Kinematics, path: Path) -> tuple[str, ...]:
     import csv
 
     table = columns(found)
@@ -91,18 +112,20 @@ def _write_csv(found: Kinematics, path: Path) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(table)
         writer.writerows(zip(*cells, strict=True))
+    return ()
 
 
-def _write_parquet(found: Kinematics, path: Path) -> None:
+def _write_parquet(found: Kinematics, path: Path) -> tuple[str, ...]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     table = columns(found)
     arrays = [pa.Array.from_buffers(pa.float64(), c.size, [None, pa.py_buffer(c.tobytes())]) for c in table.values()]
     pq.write_table(pa.table(arrays, names=list(table)), path)
+    return ()
 
 
-def _write_mcap(found: Kinematics, path: Path) -> None:
+def _write_mcap(found: Kinematics, path: Path) -> tuple[str, ...]:
     from mcap.writer import Writer
 
     stamps = np.rint(found.time * 1e9).astype(np.int64)
@@ -119,6 +142,7 @@ def _write_mcap(found: Kinematics, path: Path) -> None:
                 data = json.dumps(head | message(i)).encode()
                 writer.add_message(channels[topic], log_time=stamp, data=data, publish_time=stamp, sequence=i)
         writer.finish()  # type: ignore[no-untyped-call]
+    return ()
 
 
 Message = Callable[[int], dict[str, Any]]
@@ -195,9 +219,11 @@ FRAME_TRANSFORM: Final = _object(
 )
 """Well-known schemas of Foxglove, by their JSON names."""
 
-WRITERS: Final[Mapping[str, Callable[[Kinematics, Path], None]]] = {
+WRITERS: Final[Mapping[str, Writer]] = {
     ".csv": _write_csv,
     ".parquet": _write_parquet,
     ".mcap": _write_mcap,
+    ".blf": _write_can,
+    ".asc": _write_can,
 }
 """Writer of each suffix (lower case)."""

@@ -42,8 +42,24 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class Damage:
+    """What of a file could not be read, `place` (byte, line) of the first and how many there are. What was good is
+    kept: `lost` says in words what is not."""
+
+    what: str
+    place: str
+    count: int = 1
+    lost: str = ""
+
+    def __str__(self) -> str:
+        times = f" ({self.count} times, first there)" if self.count > 1 else ""
+        return f"{self.place}: {self.what}{times}" + (f"; {self.lost}" if self.lost else "")
+
+
+@dataclass(frozen=True)
 class Source:
-    """The file that was read. `counts`: what its container held (frames, error frames, ...); `notes`: in words."""
+    """The file that was read. `counts`: what its container held (frames, error frames, ...); `notes`: in words;
+    `damage`: what of it could not be read."""
 
     path: Path
     format: str
@@ -52,6 +68,7 @@ class Source:
     unchanged_after_read: bool = True
     counts: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    damage: tuple[Damage, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

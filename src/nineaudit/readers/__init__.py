@@ -92,6 +92,7 @@ def read(path: str | Path, rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recor
         unchanged_after_read=unchanged,
         counts=contents.counts,
         notes=contents.notes,
+        damage=contents.damage,
     )
     return assemble(contents, rig, source)
 

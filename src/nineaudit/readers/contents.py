@@ -7,16 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from nineaudit.errors import RecordingError
-from nineaudit.recording import Trace
+from nineaudit.recording import Damage, Trace
 
 
 @dataclass(frozen=True)
 class Contents:
-    """Signals of a file, one a channel, as recorded; what its container held; and what there is to say about it."""
+    """Signals of a file, one a channel, as recorded; what its container held; what there is to say about it; and what
+    of it could not be read."""
 
     traces: tuple[Trace, ...]
     counts: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    damage: tuple[Damage, ...] = ()
 
 
 def cut_short(path: Path, why: str, what_was_read: str, *, place: str | None = None) -> RecordingError:

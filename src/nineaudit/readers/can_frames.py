@@ -1,0 +1,123 @@
+"""Frames of a CAN log as columns, in the order of the log: what every CAN reader makes and every bus rule reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nineaudit.can_database import EXTENDED, ByteMatrix
+from nineaudit.recording import Damage
+
+Int64 = NDArray[np.int64]
+Rows = NDArray[np.intp]
+
+REMOTE: Final = 1
+ERROR: Final = 2
+OVERLOAD: Final = 4
+FD: Final = 8
+RATE_SWITCH: Final = 16
+ERROR_STATE: Final = 32
+SENT: Final = 64
+"""Bits of `kind`; SENT: by the logger itself (Tx)."""
+NOT_DATA: Final = REMOTE | ERROR | OVERLOAD
+IDENTIFIER: Final = EXTENDED - 1
+SHORT: Final = 8
+"""Bytes of a classic frame."""
+LONG: Final = 64
+"""Bytes of the longest FD frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """n frames of a log: data, remote, error and overload frames.
+
+    `time` (n,) int64 ns, as the log has it: since its start, or since 1970 where its stamps are dates.
+    `key` (n,) uint32 identifier with the EXTENDED flag, 0 for error and overload frames. `bus` (n,) uint16 index into
+    `buses`. `kind` (n,) uint8 flags. `length` (n,) uint8 bytes of data that are there (of a remote frame: asked for).
+    `data` (n,8) uint8 first eight bytes, zero-filled; frames of more are row `long_rows` (m,) of the log and have all
+    their bytes in `long` (m,64).
+    `counts`: what the container held besides; `damage`: what could not be read; `origin`: ns to add to every stamp for
+    the time the log's signals were written with (nineaudit's own logs), 0 if none.
+    """
+
+    time: Int64
+    key: NDArray[np.uint32]
+    bus: NDArray[np.uint16]
+    kind: NDArray[np.uint8]
+    length: NDArray[np.uint8]
+    data: ByteMatrix
+    long_rows: Rows
+    long: ByteMatrix
+    buses: tuple[str, ...] = ()
+    counts: dict[str, float] = field(default_factory=dict)
+    damage: tuple[Damage, ...] = ()
+    notes: tuple[str, ...] = ()
+    origin: int = 0
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def is_data(self) -> NDArray[np.bool_]:
+        """(n,) true for data frames."""
+        return np.asarray((self.kind & NOT_DATA) == 0)
+
+    def rows_of(self, key: int) -> Rows:
+        """Rows of the data frames of an identifier, in the order of the log."""
+        return np.flatnonzero((self.key == np.uint32(key)) & self.is_data)
+
+    def payload(self, rows: Rows) -> ByteMatrix:
+        """(len(rows), 8 or 64) bytes of frames, zero-filled: 64 only where one of them has more than 8."""
+        short = self.data[rows]
+        if not len(self.long_rows) or not (self.length[rows] > SHORT).any():
+            return short
+        out = np.zeros((len(rows), LONG), dtype=np.uint8)
+        out[:, :SHORT] = short
+        place = np.minimum(np.searchsorted(self.long_rows, rows), len(self.long_rows) - 1)
+        held = self.long_rows[place] == rows
+        out[held] = self.long[place[held]]
+        return out
+
+
+def frames(
+    time: Any,
+    key: Any,
+    bus: Any,
+    kind: Any,
+    length: Any,
+    data: ByteMatrix,
+    long_rows: Any = (),
+    long: ByteMatrix | None = None,
+    **rest: Any,
+) -> Frames:
+    """Frames from columns of any integer type."""
+    return Frames(
+        np.asarray(time, dtype=np.int64),
+        np.asarray(key, dtype=np.uint32),
+        np.asarray(bus, dtype=np.uint16),
+        np.asarray(kind, dtype=np.uint8),
+        np.asarray(length, dtype=np.uint8),
+        data,
+        np.asarray(long_rows, dtype=np.intp),
+        np.empty((0, LONG), dtype=np.uint8) if long is None else long,
+        **rest,
+    )
+
+
+def joined(parts: Sequence[Frames], **rest: Any) -> Frames:
+    """Parts of one log in order, their `bus` codes of one table; `rest` are the fields of the whole log."""
+    if not parts:
+        return frames([], [], [], [], [], np.empty((0, SHORT), dtype=np.uint8), **rest)
+    if len(parts) == 1:
+        return replace(parts[0], **rest)
+    start = np.cumsum([0, *(len(p) for p in parts)])
+    columns = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _COLUMNS}
+    columns["long_rows"] = np.concatenate([p.long_rows + at for p, at in zip(parts, start, strict=False)])
+    return Frames(**columns, **rest)
+
+
+_COLUMNS: Final = ("time", "key", "bus", "kind", "length", "data", "long")
