@@ -19,12 +19,14 @@ from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.finding import Verdict
 from nineaudit.motion import Kinematics, Start, motion_of
+from nineaudit.motion_can import as_recording
 from nineaudit.motion_command import with_points
 from nineaudit.motion_files import FRAME_TRANSFORM, POSE_IN_FRAME, columns, write_motion
 from nineaudit.motion_methods import METHODS
 from nineaudit.motion_triax import Judged, check_triax
 from nineaudit.physics import kinematics, laboratory, rigid_body
 from nineaudit.presets import PRESETS, preset_text
+from nineaudit.readers import read
 from nineaudit.report.motion_page import render_motion
 from nineaudit.rig import Point, Rig, parse_rig
 from nineaudit.simulate import Simulation, simulate
@@ -378,8 +380,60 @@ def test_a_file_in_the_way_or_of_no_known_kind_is_refused(found: Kinematics, tmp
     with pytest.raises(ConfigurationError, match="--force"):
         write_motion(found, tmp_path / "m.csv")
     assert (tmp_path / "m.csv").read_text() == "mine"
-    with pytest.raises(ConfigurationError, match=r"expected one of \.csv \.parquet \.mcap"):
+    with pytest.raises(ConfigurationError, match=r"expected one of \.csv \.parquet \.mcap \.blf \.asc"):
+        write_motion(found, tmp_path / "m.xlsx")
+
+
+@pytest.mark.parametrize("suffix", [".blf", ".asc"])
+def test_a_can_log_reads_back_within_half_a_bit_of_its_database(suffix: str, found: Kinematics, tmp_path: Path) -> None:
+    """By the readers of recordings; a bit of a vector is 1.25·2/(2^21 − 2) of its largest value, rounded to 3 digits
+    (quaternions 2^32)."""
+    log = tmp_path / f"m{suffix}"
+    write_motion(found, log)
+    written = as_recording(found)
+    back = read(log, written.rig, dbc=[tmp_path / "m.dbc"])
+    np.testing.assert_allclose(back.time, found.time, rtol=0.0, atol=1e-9)
+    for i, sensor in enumerate(written.rig.array.sensors):
+        bits = 31 if sensor.signal.startswith("quaternion") else 20
+        step = 1.25 * 1.005 * float(sensor.full_scale or 0.0) / (2**bits - 1)
+        np.testing.assert_allclose(back.readings[:, i], written.readings[:, i], rtol=0.0, atol=0.5001 * step)
+
+
+def test_a_can_log_holds_every_curve_with_its_unit_for_any_tool(found: Kinematics, tmp_path: Path) -> None:
+    """Decoded by python-can and cantools alone."""
+    import can
+    import cantools
+
+    write_motion(found, tmp_path / "m.blf")
+    database = cantools.database.load_file(tmp_path / "m.dbc")
+    units = {f"{m.name}.{s.name}": s.unit or "" for m in database.messages for s in m.signals}
+    assert (units["alpha.alpha_z"], units["CG_velocity_lab.velocity_lab_x"]) == ("rad/s^2", "m/s")
+    assert len(units) == len(columns(found)) - 1  # less the time
+    assert all(len(word) <= 32 for name in units for word in name.split("."))
+    with can.BLFReader(tmp_path / "m.blf") as frames:
+        decoded = [(f.timestamp, database.decode_message(f.arbitration_id, f.data)) for f in frames if f.dlc]
+    alpha = np.array([list(values.values()) for _, values in decoded if "alpha_x" in values])
+    np.testing.assert_allclose(alpha, found.alpha, rtol=0.0, atol=2e-6 * np.abs(found.alpha).max())
+
+
+def test_points_of_any_name_become_names_of_a_can_database(naap: Simulation, tmp_path: Path) -> None:
+    names = ["1 top", "centre of the head", "centre of the hand", "Ω"]
+    points = tuple(Point(name, 0.01 * i * POINT) for i, name in enumerate(names))
+    recording = replace(naap.recording, rig=replace(naap.recording.rig, points=points))
+    found = motion_of(Case(recording), "rates")
+    write_motion(found, tmp_path / "m.asc")
+    signals = [s.signal for s in as_recording(found).rig.array.sensors]
+    assert len(set(signals)) == len(signals)
+    assert read(tmp_path / "m.asc", as_recording(found).rig, dbc=[tmp_path / "m.dbc"]).readings.shape[1] == len(signals)
+
+
+def test_a_database_in_the_way_is_not_overwritten(found: Kinematics, tmp_path: Path) -> None:
+    (tmp_path / "m.dbc").write_text("mine")
+    with pytest.raises(ConfigurationError, match=r"m\.dbc.*--force"):
         write_motion(found, tmp_path / "m.blf")
+    assert [p.name for p in tmp_path.iterdir()] == ["m.dbc"]
+    write_motion(found, tmp_path / "m.blf", force=True)
+    assert (tmp_path / "m.dbc").read_text().startswith("VERSION")
 
 
 def test_the_page_shows_values_and_curves_and_escapes_names(naap: Simulation, found: Kinematics) -> None:
@@ -425,6 +479,10 @@ def test_the_command_writes_what_it_says_and_prints_a_summary(run: Run) -> None:
     again = run("motion", "T1.csv", "--rig", "rig.toml", "--output", "m.parquet")
     assert again[0] == 2
     assert "--force" in again[2]
+    code, out, err = run("motion", "T1.csv", "--rig", "rig.toml", "--method", "ninacc", "--output", "m.blf")
+    assert (code, err) == (0, "")
+    assert "m.dbc: its database" in out
+    assert run("motion", "T1.csv", "--rig", "rig.toml", "--output", "m.asc")[0] == 2
 
 
 def test_wrong_use_is_exit_code_2_and_says_where(run: Run) -> None:
@@ -435,7 +493,7 @@ def test_wrong_use_is_exit_code_2_and_says_where(run: Run) -> None:
         (("--point", "1,2,x"), "--point: not a list of numbers"),
         (("--angles", "nan,0,0"), "--angles: not three numbers"),
         (("--output", "T1.csv", "--force"), "an input is never written to"),
-        (("--output", "m.blf"), "no format to write a motion in"),
+        (("--output", "m.xls"), "no format to write a motion in"),
         (("--check-triax", "b"), "--check-triax: no triax by that name"),
     ):
         code, _, err = run(*head, *options)
