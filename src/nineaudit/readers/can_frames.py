@@ -115,7 +115,7 @@ def joined(parts: Sequence[Frames], **rest: Any) -> Frames:
     if len(parts) == 1:
         return replace(parts[0], **rest)
     start = np.cumsum([0, *(len(p) for p in parts)])
-    columns = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _COLUMNS}
+    columns: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in _COLUMNS}
     columns["long_rows"] = np.concatenate([p.long_rows + at for p, at in zip(parts, start, strict=False)])
     return Frames(**columns, **rest)
 
