@@ -102,8 +102,8 @@ def weight() -> Published:
     expected = stated[0] / stated[1]
     return Published(
         SOURCE,
-        "noise of α, weight V as printed over weight V⁻¹, one triax of three 5 times worse",
-        "1 (weight V)",
+        "noise of α with weight V as printed over that with V⁻¹, one triax of three 5 times worse",
+        "misprint (weight V)",
         drawn[0] / drawn[1],
         expected,
         4.0 * expected / np.sqrt(_DRAWS),

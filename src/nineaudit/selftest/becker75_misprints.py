@@ -65,7 +65,7 @@ def _eq15() -> Misprint:
 
 
 def _eq23() -> Misprint:
-    """A turn φ about X solves eq 15, linear in e: e2 = ½[(e2+e3)e^φ + (e2−e3)e^−φ], by expm of the scheme's Jacobian."""
+    """A turn φ about X solves eq 15, linear in e: e2 = ½[(e2+e3)e^φ + (e2−e3)e^−φ]; truth: expm of the Jacobian."""
     six, start = _package(), random_instants(23).omega
     phi = np.random.default_rng(23).uniform(0.0, growth.QUARTER_TURN, len(start))
     jacobian = growth.feedback_jacobian(six.positions, six.sensitivity, np.eye(3)[:1])[0]

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from nineaudit.physics.kinematics import orientation
 from nineaudit.schemes import rgla
+from nineaudit.selftest.misprints import Misprint, put_right, random_instants
 from nineaudit.selftest.published import Published
 
 SOURCE = "Hu 1977"
@@ -23,7 +24,20 @@ _RATE, _STEP, _COUNT = 30.0, 1e-3, 150
 
 def checks() -> list[Published]:
     """The recursion as printed, what it does to lengths and angles, the printed matrix, and the derivatives."""
-    return [*_recursion(), _matrix(), *_derivatives()]
+    return [*_recursion(), _matrix(), *put_right(misprints()), *_derivatives()]
+
+
+def misprints() -> list[Misprint]:
+    """The direction-cosine matrix is called self-adjoint, C = Cᵀ; it is orthogonal, C⁻¹ = Cᵀ: a vector to and fro."""
+    turned, v = _turned().as_matrix(), random_instants(77).omega
+    there = v @ turned.T
+    words = ("C is self-adjoint: back by C", "C is orthogonal: back by Cᵀ")
+    return [Misprint(SOURCE, "C⁻¹", "a vector turned there and back", *words, there @ turned.T, there @ turned, v)]
+
+
+def _turned() -> Rotation:
+    """Rz(45°)Ry(20°), ground to body."""
+    return Rotation.from_euler("z", 45.0, degrees=True).inv() * Rotation.from_euler("y", 20.0, degrees=True).inv()
 
 
 def _recursion() -> list[Published]:
@@ -59,8 +73,7 @@ def _recursion() -> list[Published]:
 
 
 def _matrix() -> Published:
-    turned = Rotation.from_euler("z", 45.0, degrees=True).inv() * Rotation.from_euler("y", 20.0, degrees=True).inv()
-    off = float(np.abs(turned.as_matrix() - PRINTED_MATRIX).max())
+    off = float(np.abs(_turned().as_matrix() - PRINTED_MATRIX).max())
     return Published(
         SOURCE, "matrix of 20° and 45° against Rz(45)Ry(20)", "nine entries", off, 0.0, 5e-10, "nine printed decimals"
     )

@@ -14,6 +14,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.schemes import martin
+from nineaudit.selftest.misprints import ROUNDED, random_instants, relative
 from nineaudit.selftest.published import Published
 
 SOURCE = "Martin 1998"
@@ -110,52 +111,14 @@ def _table() -> list[Published]:
 
 
 def _equations() -> list[Published]:
-    """rms relative error of the corrected forms; of the printed forms where METHODS gives them, in the words."""
-    rng = np.random.default_rng(1998)
-    omega, alpha, a0 = (scale * rng.standard_normal((500, 3)) for scale in (30.0, 3000.0, 500.0))
-    rx, ry, rz = ARMS
-    at = [_at(np.eye(3)[i] * arm, a0, alpha, omega) for i, arm in enumerate(ARMS)]
-    six = np.stack([at[0][:, 0], at[0][:, 1], at[1][:, 1], *at[2].T], axis=1)
-    ours_a0, ours = martin.periphery_equations(six, omega, (rx, ry, rz))
-    differences = np.stack([(at[1] - a0)[:, 2], (at[1] - a0)[:, 0], (at[2] - a0)[:, 0]], axis=1)
-    plane = martin.coplanar_equations(differences, omega, (ry, rz))
-    x, y, z = omega.T
-    eq13 = (at[0][:, 1] - at[2][:, 1]) / rx - x * y - ry * (x**2 + z**2) / rx
-    eq18 = plane[:, 1] + 2.0 * x * z
-    eq19 = plane[:, 2] - x * y - x * z
-    place = np.array([0.07, -0.05, 0.09])
-    back = martin.at_origin(_at(place, a0, alpha, omega), place, omega, alpha)
-    eq2 = back[:, 0] + 2.0 * place[2] * alpha[:, 1]
-    rounding = "rounding of the sums"
+    """Eqs 8 to 11, right as printed; the misprinted ones are in martin98_misprints.py."""
+    motion, (rx, ry, rz) = random_instants(1998), ARMS
+    a1, a2, a3 = (motion.at(*place) for place in np.diag(ARMS))
+    six = np.column_stack([a1[:, :2], a2[:, 1], a3])
+    a0, alpha = martin.periphery_equations(six, motion.omega, (rx, ry, rz))
+    pairs = (("eqs 8-10", a0, motion.a0), ("eq 11", alpha[:, 0], motion.alpha[:, 0]))
+    label = "rms relative error on random motion"
     return [
-        _exact("eq 2 put right", f"printed form off by {_percent(eq2, a0[:, 0])}", back[:, 0], a0[:, 0], rounding),
-        _exact("eqs 8-10", "right as printed", ours_a0, a0, rounding),
-        _exact("eqs 11-12 put right", "eq 12 printed with other arms", ours[:, :2], alpha[:, :2], rounding),
-        _exact(
-            "eq 13 put right", f"printed form off by {_percent(eq13, alpha[:, 2])}", ours[:, 2], alpha[:, 2], rounding
-        ),
-        _exact(
-            "eq 18 put right", f"printed form off by {_percent(eq18, alpha[:, 1])}", plane[:, 1], alpha[:, 1], rounding
-        ),
-        _exact(
-            "eq 19 put right", f"printed form off by {_percent(eq19, alpha[:, 2])}", plane[:, 2], alpha[:, 2], rounding
-        ),
+        Published(SOURCE, f"{name}, {label}", "right as printed", relative(*pair), 0.0, ROUNDED, "rounding of the sums")
+        for name, *pair in pairs
     ]
-
-
-def _at(place: FloatArray, a0: FloatArray, alpha: FloatArray, omega: FloatArray) -> FloatArray:
-    return np.asarray(a0 + np.cross(alpha, place) + np.cross(omega, np.cross(omega, place)))
-
-
-def relative(values: FloatArray, truth: FloatArray) -> float:
-    """rms of the error over rms of the truth."""
-    return float(np.sqrt(((values - truth) ** 2).mean() / (truth**2).mean()))
-
-
-def _percent(values: FloatArray, truth: FloatArray) -> str:
-    return f"{100.0 * relative(values, truth):.2g} %"
-
-
-def _exact(quantity: str, printed: str, values: FloatArray, truth: FloatArray, why: str) -> Published:
-    label = f"{quantity}, rms relative error on random motion"
-    return Published(SOURCE, label, printed, relative(values, truth), 0.0, 1e-12, why)

@@ -8,18 +8,18 @@ import numpy as np
 
 from nineaudit.physics import nap
 from nineaudit.schemes import martin
+from nineaudit.selftest import martin98
+from nineaudit.selftest.martin98 import ARMS, SOURCE
 from nineaudit.selftest.misprints import Misprint, put_right, random_instants
 from nineaudit.selftest.published import Published
 
-SOURCE: Final = "Martin 1998"
-ARMS: Final = (-0.08, -0.10, 0.13)
 NAP_ARMS: Final = (0.050, 0.062, 0.071)
 PLACE: Final = np.array([0.07, -0.05, 0.09])
 
 
 def checks() -> list[Published]:
-    """Each equation put right."""
-    return put_right(misprints())
+    """Each equation put right, and two numbers of Table 3."""
+    return [*put_right(misprints()), *_table_3()]
 
 
 def misprints() -> list[Misprint]:
@@ -76,10 +76,34 @@ def _coplanar() -> list[Misprint]:
     on_y, on_z = motion.at(0.0, ry, 0.0) - motion.a0, motion.at(0.0, 0.0, rz) - motion.a0
     differences = np.stack([on_y[:, 2], on_y[:, 0], on_z[:, 0]], axis=1)
     right = martin.coplanar_equations(differences, motion.omega, (ry, rz))
-    x, y, z = motion.omega.T
+    x, z = motion.omega[:, 0], motion.omega[:, 2]
     eq18 = on_z[:, 0] / rz + x * z
     eq19 = -on_y[:, 0] / ry - x * z
     return [
         Misprint(SOURCE, "18", "αy", "+ ωxωz", "− ωxωz", eq18, right[:, 1], motion.alpha[:, 1]),
         Misprint(SOURCE, "19", "αz", "− ωxωz", "+ ωxωy", eq19, right[:, 2], motion.alpha[:, 2]),
     ]
+
+
+def _table_3() -> list[Published]:
+    """Both schemes measure one A0: the peripheral one with the printed A_X (t1) and A_Z (t2) put right is held against
+    the compact cube. |A| alone would not tell the sign of A_X: 262.9 with 240, 263.2 g with −240."""
+    out = []
+    for name, axis, channel, misprinted in (("t1", 0, "ax", 240.0), ("t2", 1, "az", 5.5)):
+        at = martin98.TABLE_3[name]
+        common = {"omega": at.omega, "alpha": at.alpha, "rx": ARMS[0], "rz": ARMS[2]}
+        ours = dict(zip(("ax", "az"), at.peripheral, strict=True)) | common
+        other = dict(zip(("ax", "az"), at.compact, strict=True)) | common
+        printed = float(martin98.peripheral(ours | {channel: misprinted})[axis])
+        out.append(
+            Published(
+                SOURCE,
+                f"Table 3 {name}, A0{'XZ'[axis]} of the peripheral scheme against the compact cube, g",
+                f"{printed:.1f} by A{'XZ'[axis]} = {misprinted:g}",
+                float(martin98.peripheral(ours)[axis]),
+                float(martin98.compact(other)[axis]),
+                0.5,
+                "half of the last digit of Table 3's A1X and A1Z",
+            )
+        )
+    return out

@@ -42,7 +42,12 @@ class Misprint:
     @property
     def error(self) -> str:
         """The same with two digits, and of what."""
-        return f"{float(f'{self.percent:.2g}'):g} % of {self.quantity}"
+        return f"{self.rounded} of {self.quantity}"
+
+    @property
+    def rounded(self) -> str:
+        """`percent` with two digits."""
+        return f"{float(f'{self.percent:.2g}'):g} %"
 
 
 class RandomInstants(NamedTuple):
@@ -69,7 +74,7 @@ def put_right(misprints: Iterable[Misprint]) -> list[Published]:
         Published(
             m.source,
             f"eq {m.equation} put right, rms relative error of {m.quantity} on random motion",
-            f"misprint ({m.percent:.2g} % off)",
+            f"misprint ({m.rounded} off)",
             relative(m.put_right, m.truth),
             0.0,
             m.rounding,

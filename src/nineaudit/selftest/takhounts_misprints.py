@@ -1,4 +1,4 @@
-"""Misprinted closed forms of Takhounts et al. 2009, eqs 23 to 33, as printed and put right, on one random motion."""
+"""Misprinted equations of Takhounts et al. 2009, 22a to 33 and 37, as printed and put right, on one random motion."""
 
 from __future__ import annotations
 
@@ -9,14 +9,35 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.physics import nap, rigid_body
+from nineaudit.schemes import takhounts
 from nineaudit.schemes.rgla import simpson_integral
+from nineaudit.selftest.misprints import Misprint, put_right, random_instants, relative
 from nineaudit.selftest.published import Published
 
 SOURCE = "Takhounts 2009"
 ARMS: Final = (0.055, 0.048, 0.071)
 """Of the random motion on which METHODS 1.2 weighs the misprints."""
 _ROUNDED = "a unit of the last digit of METHODS 1.2"
-
+_INTEGRATED: Final = 1e-9
+"""Error of integration at 5 µs, over the size of what is integrated."""
+_PROFUSE: Final = ("nearly every term", "do not use it: see below")
+_WORDS: Final = {
+    "23": (
+        "ωx = ∫[… − (a1z−a0z)/2rz], ωy = ∫[… − (a1x−a0x)/2rx]",
+        "ωx needs (a3y−a0y)/2rz, ωy needs (a1z−a0z)/2rx",
+    ),
+    "25": ("(a1x−a0x)/2rx in ωy; (a1y−a0y)/2rz", "a1z; 2rx, twice"),
+    "27": ("(a2z−a0z)/2rx, twice", "2ry"),
+    "28b": ("prefactor 2rx, a1x in ωy", "a0x = a2x − 2ry{ωxωy − (a1y−a0y)/2rx}"),
+    "30a": ("ωyωz with 2rx in its first and 2rz in its second integral", "2rz in the first, 2rx in the second"),
+    "30b": ("ωx from (a2x−a0x)/2ry; the sum has (a2z−a0z)/2ry", "ωxωy; (a2x−a0x)/2ry in the sum"),
+    "32a": ("ωyωz with 2rx in its first and 2rz in its second integral", "2rz in the first, 2rx in the second"),
+    "32b": ("ωz with (a1y−a0y)/2rz; the sum has (a3y−a0y)/2rz", "ωzωx; (a3x−a0x)/2rz in the sum"),
+    "29": _PROFUSE,
+    "31": _PROFUSE,
+    "33": _PROFUSE,
+}
+"""Equation: what is printed, what is right."""
 
 MISPRINTS: Final = {
     "23": (16.0, 1.0),
@@ -71,11 +92,17 @@ def printed_forms(motion: RandomMotion) -> dict[str, tuple[str, FloatArray]]:
     wz = integral(part("a1y", rx) - part("a2x", ry))
     wy_wrong = integral(part("a3x", rz) - part("a1x", rx))
     wx_wrong = integral(part("a2z", ry) - part("a1z", rz))
+    wy_30, wz_30 = integral(part("a3x", rx) - part("a1z", rx)), integral(part("a1y", rz) - part("a2x", ry))
+    wx_30 = integral(part("a2x", ry) - part("a3y", rz))
     return {
         "23": ("a1y", 2 * rx * (wx_wrong * wy_wrong - part("a2x", ry)) + c["a0y"]),
         "25": ("a2x", 2 * ry * (wx * wy_wrong - part("a1y", rz)) + c["a0x"]),
         "27": ("a3y", 2 * rz * (wy * wz - part("a2z", rx)) + c["a0y"]),
         "28b": ("a0x", -2 * rx * (wx * wy_wrong - part("a1y", rx)) + c["a2x"]),
+        "30a": ("a0y", -2 * rz * (wy_30 * wz_30 - part("a2z", ry)) + c["a3y"]),
+        "30b": ("a0y", -2 * rx * (wx_30 * wy - part("a2z", ry)) + c["a1y"]),
+        "32a": ("a0z", -2 * ry * (wy_30 * wz_30 - part("a3y", rz)) + c["a2z"]),
+        "32b": ("a0z", -2 * rx * (wz_30 * wy - part("a3y", rz)) + c["a1z"]),
     }
 
 
@@ -106,30 +133,79 @@ def printed_velocities(motion: RandomMotion) -> dict[str, tuple[str, FloatArray]
     }
 
 
-def checks() -> list[Published]:
-    """Right forms to rounding; the printed forms as far off as METHODS 1.2 says."""
+def misprints() -> list[Misprint]:
+    """Every equation as printed and as it should be, against the rigid body."""
     motion = random_motion()
-    out = []
-    for equation, (channel, values) in printed_forms(motion).items():
-        percent, width = MISPRINTS[equation]
-        ours = 100.0 * relative(values, motion.channel[channel])
-        label = f"eq {equation} as printed, rms relative error of {channel} on random motion, %"
-        out.append(Published(SOURCE, label, f"misprint ({percent:g} %)", ours, percent, width, _ROUNDED))
     nine = np.stack([motion.channel[name] for name in nap.CHANNELS], axis=1)
     turning = np.abs(nap.omega(nine, np.array(ARMS), motion.time)).min(axis=1) > 1.0
-    for equation, (channel, values) in printed_velocities(motion).items():
-        percent, width = MISPRINTS[equation]
-        ours = 100.0 * relative(values[turning], motion.integral(motion.channel[channel])[turning])
-        label = f"eq {equation} as printed, rms relative error of ∫{channel} where |ω| components exceed 1 rad/s, %"
-        out.append(Published(SOURCE, label, f"misprint ({percent:g} %)", ours, percent, width, _ROUNDED))
+    right = {name: nap.rebuild(name, nine, np.array(ARMS), motion.time) for name in nap.CHANNELS}
+    found = [_eq22a()]
+    for equation, (name, values) in printed_forms(motion).items():
+        sides = values, right[name], motion.channel[name]
+        found.append(Misprint(SOURCE, equation, name, *_WORDS[equation], *sides, _INTEGRATED))
+    for equation, (name, values) in printed_velocities(motion).items():
+        sums = (values, motion.integral(right[name]), motion.integral(motion.channel[name]))
+        wrong, ours, truth = (part[turning] for part in sums)
+        quantity = f"∫{name} where components of ω exceed 1 rad/s"
+        found.append(Misprint(SOURCE, equation, quantity, *_WORDS[equation], wrong, ours, truth, _INTEGRATED))
+    return [*found, _eq37()]
+
+
+def _eq22a() -> Misprint:
+    """αz of eq 12 where a1x and a2y stand for a1y and a2x: along the arms, which feel no α at all."""
+    motion, (rx, ry, _) = random_instants(22), ARMS
+    on_x, on_y = motion.at(rx, 0.0, 0.0) - motion.a0, motion.at(0.0, ry, 0.0) - motion.a0
+    wrong = on_x[:, 0] / (2 * rx) - on_y[:, 1] / (2 * ry)
+    right = on_x[:, 1] / (2 * rx) - on_y[:, 0] / (2 * ry)
+    words = ("a1x, a2y among the nine channels", "no such channels: a1y, a2x")
+    return Misprint(SOURCE, "22a", "αz", *words, wrong, right, motion.alpha[:, 2])
+
+
+def _eq37() -> Misprint:
+    """Row 2: the y reading of the far corner of the triangle of Fig 10."""
+    motion, rx, ry = random_instants(37), 0.06, 0.05
+    right = takhounts.triangle_corner(motion.a0, motion.alpha, motion.omega, rx, ry)[:, 1]
+    wrong = right + (motion.alpha[:, 0] - motion.alpha[:, 2]) * rx / 2.0
+    return Misprint(SOURCE, "37 row 2", "that row", "αx", "αz", wrong, right, motion.at(rx / 2.0, ry, 0.0)[:, 1])
+
+
+def rank_as_listed() -> int:
+    """Rank of H of the nine channels with a1x and a2y in place of a1y and a2x, as eq 22a lists them."""
+    places = dict(zip("0123", np.vstack([np.zeros(3), np.diag(ARMS)]), strict=True))
+    listed = [{"a1y": "a1x", "a2x": "a2y"}.get(name, name) for name in nap.CHANNELS]
+    axes = np.array([np.eye(3)["xyz".index(name[2])] for name in listed])
+    h = rigid_body.design(np.array([places[name[1]] for name in listed]) / max(ARMS), axes)
+    return int(np.linalg.matrix_rank(h))
+
+
+def checks() -> list[Published]:
+    """Right forms to rounding; the printed forms as far off as METHODS 1.2 says, where it says."""
+    found = misprints()
+    out = [
+        Published(
+            SOURCE,
+            f"eq {m.equation} as printed, rms relative error of {m.quantity} on random motion, %",
+            f"misprint ({MISPRINTS[m.equation][0]:g} %)",
+            m.percent,
+            *MISPRINTS[m.equation],
+            _ROUNDED,
+        )
+        for m in found
+        if m.equation in MISPRINTS
+    ]
+    listed = "eq 22a, rank of H with a1x and a2y as listed (6 with the right nine)"
+    out.append(Published(SOURCE, listed, "6 (nine channels)", rank_as_listed(), 5, 0.5, "a rank is a whole number"))
+    out += put_right(m for m in found if _WORDS.get(m.equation) is not _PROFUSE)
+    return [*out, *_closed_forms()]
+
+
+def _closed_forms() -> list[Published]:
+    """All nine, as physics/nap.py has them; those of the centre stand in for eqs 29, 31 and 33."""
+    motion, out = random_motion(), []
+    nine = np.stack([motion.channel[name] for name in nap.CHANNELS], axis=1)
     for name in nap.CHANNELS:
-        rebuilt = nap.rebuild(name, nine, np.array(ARMS), motion.time)
-        label = f"closed form of {name} put right, rms relative error on random motion"
-        error = relative(rebuilt, motion.channel[name])
-        out.append(Published(SOURCE, label, "0 (exact)", error, 0.0, 1e-9, "integration at 5 µs, ends of the record"))
+        error = relative(nap.rebuild(name, nine, np.array(ARMS), motion.time), motion.channel[name])
+        label = f"closed form of {name}, rms relative error on random motion"
+        why = "integration at 5 µs, ends of the record"
+        out.append(Published(SOURCE, label, "0 (exact)", error, 0.0, _INTEGRATED, why))
     return out
-
-
-def relative(values: FloatArray, truth: FloatArray) -> float:
-    """rms of the error over rms of the truth."""
-    return float(np.sqrt(((values - truth) ** 2).mean() / (truth**2).mean()))
