@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from nineaudit.can_database import EXTENDED, ByteMatrix
+from nineaudit.can_bits import ByteMatrix
+from nineaudit.can_database import EXTENDED
 from nineaudit.recording import Damage
 
 Int64 = NDArray[np.int64]

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nineaudit import can_database
+from nineaudit import can_bits, can_database
 from nineaudit.array import FloatArray, frozen
-from nineaudit.can_database import BusSignal, bytes_needed
+from nineaudit.can_bits import bytes_needed
+from nineaudit.can_database import BusSignal
 from nineaudit.errors import RecordingError
 from nineaudit.readers import frames as frame_log
 from nineaudit.readers import mdf
@@ -105,7 +106,7 @@ def _decode(signal: BusSignal, frames: Series) -> tuple[FloatArray, FloatArray, 
     values, carried = np.full(frames.time.size, np.nan), np.ones_like(whole)
     if signal.plain:
         payload = np.pad(frames.payload, ((0, 0), (0, max(0, needed - frames.payload.shape[1]))))
-        values[whole] = can_database.decode(signal.signal, payload[whole])
+        values[whole] = can_bits.decode(signal.signal, payload[whole])
     else:
         decoded = [_one(signal, bytes(p[:n])) for p, n in zip(frames.payload, frames.length, strict=True)]
         carried = np.array([value is not None for value in decoded])

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from nineaudit.array import FloatArray
-from nineaudit.can_database import EXTENDED, ByteMatrix
+from nineaudit.can_bits import ByteMatrix
+from nineaudit.can_database import EXTENDED
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import cut_short, span
 from nineaudit.signals import can_origin

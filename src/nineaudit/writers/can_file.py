@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from nineaudit import can_database
+from nineaudit import can_bits, can_database
 from nineaudit.array import BoolArray, FloatArray, Sensor
-from nineaudit.can_database import BusSignal, ByteMatrix
+from nineaudit.can_bits import ByteMatrix
+from nineaudit.can_database import BusSignal
 from nineaudit.errors import ConfigurationError
 from nineaudit.recording import Recording
 from nineaudit.signals import CAN_ORIGIN, si_factor
@@ -99,7 +100,7 @@ def _encode(recording: Recording, readings: FloatArray, dbc: Sequence[Path]) -> 
     for block in blocks.values():
         frames.append(_block(block, recording.time))
         for sensor, signal, values in block:
-            held = can_database.decode(signal.signal, frames[-1].payload)
+            held = can_bits.decode(signal.signal, frames[-1].payload)
             misses = np.abs(held - values)[np.isfinite(values)] * si_factor(sensor, signal.signal.unit)
             error[sensor.channel] = float(misses.max(initial=0.0))
         message = block[0][1].message
@@ -128,7 +129,7 @@ def _block(block: Sequence[tuple[Sensor, BusSignal, FloatArray]], time: FloatArr
                 expected="a floating-point signal, or a message of its own",
                 advice="write .csv, .parquet or .mcap",
             )
-        can_database.encode(signal.signal, values if signal.signal.is_float else np.nan_to_num(values), payload)
+        can_bits.encode(signal.signal, values if signal.signal.is_float else np.nan_to_num(values), payload)
     return _Frames(message, payload, sent)
 
 
@@ -162,7 +163,7 @@ def _room(bits: Any) -> tuple[float, float]:
     if bits.is_float:
         most = float(np.finfo(f"f{bits.length // 8}").max)
         return -most, most
-    ends = [raw * bits.scale + bits.offset for raw in can_database.raw_limits(bits)]
+    ends = [raw * bits.scale + bits.offset for raw in can_bits.raw_limits(bits)]
     low, high = min(ends), max(ends)
     stated = bits.minimum, bits.maximum
     slack = abs(bits.scale)
