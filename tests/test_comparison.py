@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import json
+import re
+
 import numpy as np
 import pytest
 
@@ -9,9 +14,13 @@ from nineaudit import cli
 from nineaudit.case import Case
 from nineaudit.comparison import EXPLAINED, compare, outputs
 from nineaudit.errors import ConfigurationError, EstimationError
+from nineaudit.report import scheme_styles
+from nineaudit.report.comparison_document import document
 from nineaudit.report.comparison_page import HEADERS, lines, render
+from nineaudit.report.machine import to_json
 from nineaudit.rig import parse_rig, preset_text
-from nineaudit.schemes import rating
+from nineaudit.scheme_runs import schemes_of
+from nineaudit.schemes import rating, rgla
 from nineaudit.simulate import simulate
 
 TIME = np.arange(1001) * 1e-4
@@ -74,15 +83,16 @@ def healthy():
 
 def test_every_scheme_that_the_sensors_allow_runs(healthy):
     _, found = healthy
-    assert set(found.curves) == {"map", "optimised", "product-free", "ninacc", "rates", "compact-cube", "rgla"}
+    rgla = {"rgla", "rgla-fourier", "rgla-lanczos"}
+    assert set(found.curves) == {"map", "optimised", "product-free", "ninacc", "rates", "compact-cube", *rgla}
     assert {"periphery", "co-planar"} <= set(found.refused)
     assert "triaxes on two axes" in found.refused["co-planar"]
     assert found.reference == "map"
-    assert len(found.rows) == 6 * 4 * 3
+    assert len(found.rows) == 8 * 4 * 3
 
 
 def test_a_healthy_recording_is_explained_by_its_budget(healthy):
-    """Ratios of normal errors to their sd: 5 % are beyond 2; of 72 related rows, four fifths are surely within."""
+    """Ratios of normal errors to their sd: 5 % are beyond 2; of 96 related rows, four fifths are surely within."""
     _, found = healthy
     assert np.mean([row.explained for row in found.rows]) > 0.8
     assert np.median([row.ratio for row in found.rows]) < 1.5
@@ -116,7 +126,7 @@ def test_text_and_page_hold_every_row(healthy):
     assert any(line.startswith("not run: periphery: ") for line in text)
     page = render(found, recording)
     assert page.count("<tr>") == 1 + len(found.rows)
-    assert page.count('class="chart"') == 2 * 12  # six schemes, four to a figure
+    assert page.count('class="chart"') == 2 * 12  # five schemes of accelerometers and rates, three derivatives
     assert "CFC180" in text[0]
     assert "a(CG) z" in page
 
@@ -144,8 +154,10 @@ def test_the_command_prints_the_table_and_writes_the_page(tmp_path, capsys, monk
 
     simulated = ("simulate", "rig.toml", "--motion", "oblique", "--duration", "0.06", "--output", "T.csv")
     assert run(*simulated)[0] == 0
-    code, shown = run("compare", "T.csv", "--rig", "rig.toml", "--draws", "3", "--html", "o.html")
+    code, shown = run("compare", "T.csv", "--rig", "rig.toml", "--draws", "3", "--html", "o.html", "--json", "o.json")
     assert code == 0
+    assert shown.out.splitlines()[-2:] == ["o.html", "o.json"]
+    assert json.loads((tmp_path / "o.json").read_text(encoding="utf-8"))["reference"] == "map"
     assert "4 schemes, against map" in shown.out.splitlines()[0]
     assert (tmp_path / "o.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert run("compare", "T.csv", "--rig", "rig.toml", "--reference", "rgla")[0] == 2
@@ -155,7 +167,7 @@ def test_an_array_whose_accelerometers_do_not_tell_alpha_is_compared_by_its_rate
     """The whole-record fit would leave α to differences of ω at the noise's mercy: it is refused, with the rank."""
     found = compare(Case(recorded("rgla")), draws=3)
     assert found.reference == "rates"
-    assert set(found.curves) == {"rates", "compact-cube", "rgla"}
+    assert set(found.curves) == {"rates", "compact-cube", "rgla", "rgla-fourier", "rgla-lanczos"}
     assert "rank 3" in found.refused["map"]
 
 
@@ -166,3 +178,105 @@ def test_a_class_that_the_recording_has_been_through_is_refused():
     with pytest.raises(ConfigurationError, match="filtered twice: CFC180 after CFC180"):
         compare(case, draws=2, cfc=180.0)
     assert compare(case, draws=2).cfc is None
+
+
+def test_the_document_holds_every_row_and_no_number_that_is_none(healthy):
+    recording, found = healthy
+    made = json.loads(to_json(document(found, recording)))
+    assert made["schema"] == "nineaudit/comparison/1"
+    assert made["recording"]["sha256"] == recording.source.sha256
+    assert (set(made["schemes"]), set(made["not_run"])) == (set(found.curves), set(found.refused))
+    assert len(made["differences"]) == len(found.rows)
+    for one, row in zip(made["differences"], found.rows, strict=True):
+        assert (one["scheme"], one["quantity"], one["axis"]) == (row.scheme, row.quantity, row.axis)
+        one_si = 9.80665 if one["unit"] == "g_0" else 1.0
+        assert one["U"] * one_si == pytest.approx(2.0 * row.u, rel=1e-5)
+        assert one["largest_difference"] * one_si == pytest.approx(row.difference, rel=1e-5)
+        assert one["explained"] == (one["ratio"] <= made["explained_up_to"])
+        assert (one["iso_18571"] or {}).get("overall") == pytest.approx(row.rating and row.rating.overall, rel=1e-5)
+
+
+def test_derivatives_of_the_rates_agree_with_the_truth_where_the_class_passes():
+    """Five points, Fourier and Lanczos through CFC180, each within three times its own noise of the true α: noise of
+    the rate sensors behind a derivative cut at f is σ·2πf/√3 at most, f = 300 Hz, in 2·300 Hz of the rate."""
+    made = simulate(parse_rig(preset_text("rgla")), "general", seed=3, imperfect=False)
+    case = Case(made.recording)
+    found = compare(case, "rgla", draws=2)
+    sigma = case.condensed.sigma[3:].max()
+    rms = sigma * 2 * np.pi * 300.0 / np.sqrt(3.0) * np.sqrt(2 * 300.0 / found.rate)
+    true = np.stack([np.interp(found.time, made.truth.time, made.truth.alpha[:, i]) for i in range(3)], axis=1)
+    for name in ("rgla", "rgla-fourier", "rgla-lanczos"):
+        assert np.sqrt(((found.curves[name]["alpha"] - true)[20:-20] ** 2).mean()) < 3.0 * rms
+    assert not np.array_equal(found.curves["rgla-fourier"]["alpha"], found.curves["rgla-lanczos"]["alpha"])
+
+
+def test_harmonics_in_white_noise_are_counted_up_to_the_last_that_was_put_in():
+    """Sine 30 stands at 20 σ√(2/N); √(2 ln N) of the noise is passed by less than one record in five at N = 400·3."""
+    time = np.arange(401) * 1e-3
+    clean = np.stack([np.sin(np.pi * 30 * time / 0.4), np.sin(np.pi * 7 * time / 0.4), 0 * time], axis=1)
+    sigma = np.full(3, np.sqrt(400 / 2) / 20.0)
+    counts = [
+        rgla.signal_terms(clean + sigma * np.random.default_rng(seed).standard_normal(clean.shape), time, sigma)
+        for seed in range(40)
+    ]
+    assert min(counts) == 30
+    assert np.mean(np.array(counts) == 30) > 0.6
+    assert rgla.signal_terms(0.0 * clean, time, sigma) == 1
+
+
+# --- lines of the page ----------------------------------------------------------------------------------------------
+
+DICHROMATS = {
+    "all cones": (1, 0, 0, 0, 1, 0, 0, 0, 1),
+    "protanope": (0.152286, 1.052583, -0.204868, 0.114503, 0.786281, 0.099216, -0.003882, -0.048116, 1.051998),
+    "deuteranope": (0.367322, 0.860646, -0.227968, 0.280085, 0.672501, 0.047413, -0.011820, 0.042940, 0.968881),
+    "tritanope": (1.255528, -0.076749, -0.178779, -0.078411, 0.930809, 0.147602, 0.004733, 0.691367, 0.303900),
+}
+"""Machado, Oliveira, Fernandes 2009, severity 1, of linear RGB."""
+XYZ = np.array(
+    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+)
+
+
+def linear(colour: str) -> np.ndarray:
+    c = np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def lab(rgb: np.ndarray) -> np.ndarray:
+    x = XYZ @ rgb / [0.95047, 1.0, 1.08883]
+    f = np.where(x > (6 / 29) ** 3, np.cbrt(x), x / (3 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize(("ground", "column"), [("#ffffff", 0), ("#14181c", 1)], ids=["light", "dark"])
+@pytest.mark.parametrize("eyes", DICHROMATS)
+def test_every_scheme_has_a_colour_of_its_own_for_all_eyes(ground, column, eyes):
+    """3:1 against the ground (WCAG 2.1, 1.4.11); 2.3 in CIELAB is just noticeable (Mahy 1994), 9.2 is plain."""
+    colours = [style[column] for style in scheme_styles.STYLES.values()]
+    light = [float(XYZ[1] @ linear(colour)) + 0.05 for colour in (ground, *colours)]
+    assert min(max(one / light[0], light[0] / one) for one in light[1:]) >= 3.0
+    seen = [lab(np.clip(np.reshape(DICHROMATS[eyes], (3, 3)) @ linear(colour), 0.0, 1.0)) for colour in colours]
+    apart = [float(np.linalg.norm(a - b)) for i, a in enumerate(seen) for b in seen[:i]]
+    assert min(apart) > 4 * 2.3
+
+
+def test_every_scheme_has_a_dash_pattern_of_its_own_and_a_place_in_a_chart(healthy):
+    styles = scheme_styles.STYLES
+    assert set(styles) == set(schemes_of(Case(healthy[0])))
+    assert len({style.dash for style in styles.values()}) == len(styles)
+    assert sorted(name for family in scheme_styles.FAMILIES for name in family) == sorted(styles)
+    assert max(map(len, scheme_styles.groups(styles))) <= scheme_styles.MOST
+    assert sorted(name for group in scheme_styles.groups(styles) for name in group) == sorted(styles)
+
+
+def test_the_page_draws_every_scheme_in_its_own_line_and_its_sheet_is_allowed(healthy):
+    recording, found = healthy
+    page = render(found, recording)
+    for name in found.curves:
+        assert f"--scheme-{name}: {scheme_styles.STYLES[name].light}" in page
+        drawn = re.findall(rf'<path class="line scheme-{name}( reference)?" d="M', page)
+        assert len(drawn) == (2 * 24 if name == "map" else 2 * 12)  # in the chart, and the key to it
+        assert all(bool(one) == (name == "map") for one in drawn)
+    sheet = page.partition("<style>")[2].partition("</style>")[0]
+    assert base64.b64encode(hashlib.sha256(sheet.encode()).digest()).decode() in page

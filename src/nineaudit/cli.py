@@ -18,7 +18,7 @@ from typing import Annotated, NoReturn, ParamSpec, TypeVar
 
 import typer
 
-from nineaudit import motion_command
+from nineaudit import compare_command, motion_command
 from nineaudit.calibrate import calibrate_app
 from nineaudit.errors import NineauditError
 from nineaudit.options import Dbc, Force, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
@@ -167,26 +167,6 @@ def report(
     _print([str(html)])
 
 
-@app.command(epilog=example("nineaudit compare T0001.csv --rig rig.toml --html schemes.html"))
-def compare(
-    recording: Recording,
-    rig: RigOption,
-    reference: Annotated[str | None, typer.Option(metavar="SCHEME", help="Default: map, the whole-record fit.")] = None,
-    draws: Annotated[int, typer.Option(help="Of the instrument, for the budgets of the differences.")] = 16,
-    cfc: Annotated[float | None, typer.Option(metavar="CLASS", help="Of all curves; default 180, 0: none.")] = None,
-    dbc: Dbc = None,
-    html: Annotated[Path | None, typer.Option(metavar="F", help="Write the page with the curves.")] = None,
-) -> None:
-    """Run every scheme that the sensors allow and compare α, ω and the acceleration of every point."""
-    from nineaudit import commands
-    from nineaudit.outputs import protect
-    from nineaudit.rig import load_rig
-
-    instrument = load_rig(rig)
-    protect([html], [recording, rig, *(dbc or instrument.dbc)])
-    _print(commands.compared(recording, instrument, reference, draws=draws, cfc=cfc, dbc=dbc or (), html=html))
-
-
 @app.command(epilog=example("nineaudit demo"))
 def demo(
     output: Annotated[
@@ -247,6 +227,7 @@ def _printing(command: Callable[P, tuple[list[str], int]]) -> Callable[P, None]:
 
 
 app.command("motion", epilog=motion_command.EXAMPLE)(_printing(motion_command.motion))
+app.command("compare", epilog=compare_command.EXAMPLE)(_printing(compare_command.compare))
 
 for name, reference in (("rules", rules_app), ("rig", rig_app), ("calibrate", calibrate_app)):
     app.add_typer(reference, name=name, result_callback=typer.echo)

@@ -126,29 +126,6 @@ def selftested(date: str | None = None, json: Path | None = None) -> tuple[list[
     return record.lines(checks, when, absent), all(check.passed for check in checks)
 
 
-def compared(
-    path: Path,
-    rig: Rig,
-    reference: str | None,
-    *,
-    draws: int,
-    cfc: float | None = None,
-    dbc: Sequence[Path] = (),
-    html: Path | None = None,
-) -> list[str]:
-    """Every scheme of a recording against the reference, as lines; the page where it is wanted."""
-    from nineaudit.case import Case
-    from nineaudit.comparison import compare
-    from nineaudit.readers import read
-    from nineaudit.report.comparison_page import lines, render
-
-    recording = read(path, rig, dbc=dbc)
-    found = compare(Case(recording), reference, draws, cfc=cfc)
-    if html is not None:
-        write_text(html, render(found, recording))
-    return lines(found, recording) + ([] if html is None else [str(html)])
-
-
 def rules_lines(book: Rulebook) -> list[str]:
     """Code, severity and title of every rule."""
     return [f"{rule.code}  {rule.severity:<7}  {rule.title}" for rule in book.rules]

@@ -82,6 +82,11 @@ class Comparison:
     draws: int
     remarks: tuple[str, ...] = ()
 
+    @property
+    def rate(self) -> float:
+        """Samples of the curves per second."""
+        return _rate(self.time)
+
 
 def compare(
     case: Case, reference: str | None = None, draws: int = DRAWS, seed: int = SEED, cfc: float | None = None
@@ -96,7 +101,7 @@ def compare(
     if draws < 2:
         raise ConfigurationError("too few draws", place="--draws", found=draws, expected="2 or more")
     class_ = _class(case, cfc)
-    schemes = {name: _filtered(scheme, case.condensed.time, class_) for name, scheme in schemes_of(case).items()}
+    schemes = {name: _filtered(scheme, case, class_) for name, scheme in schemes_of(case).items()}
     readings = bridge(case.condensed.readings, case.condensed.time)
     motions, refused = _run(schemes, readings)
     chosen = _reference(reference, tuple(schemes), motions, refused)
@@ -139,15 +144,15 @@ def _class(case: Case, cfc: float | None) -> float | None:
     return cfc or None
 
 
-def _filtered(scheme: Scheme, time: FloatArray, class_: float | None) -> Scheme:
-    """The scheme with its curves through a class."""
+def _filtered(scheme: Scheme, case: Case, class_: float | None) -> Scheme:
+    """The scheme with its curves through a class that the recording has not been through."""
     if class_ is None:
         return scheme
-    rate = _rate(time)
+    rate, already = _rate(case.condensed.time), case.recording.rig.cfc
 
     def run(readings: FloatArray) -> Motion:
         found = scheme(readings)
-        omega, alpha, a0 = (filters.cfc(v, rate, class_) for v in (found.omega, found.alpha, found.a0))
+        omega, alpha, a0 = (filters.once(v, rate, class_, already) for v in (found.omega, found.alpha, found.a0))
         return Motion(omega, alpha, a0, found.method)
 
     return run

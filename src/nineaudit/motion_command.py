@@ -34,7 +34,7 @@ MethodName = Annotated[
     typer.Option(
         metavar="NAME",
         help="map, padgaonkar, ninacc, six-accelerometers, product-free, rates, periphery, co-planar, compact-cube, "
-        "rgla.",
+        "rgla, rgla-fourier, rgla-lanczos.",
     ),
 ]
 Curves = Annotated[

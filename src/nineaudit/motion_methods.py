@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -181,7 +182,15 @@ METHODS: Final[Mapping[str, tuple[Method, str]]] = {
     "periphery": (_with_rates(martin.periphery), "triaxes on three axes and rate sensors [Martin98 eqs 8-13]"),
     "co-planar": (_with_rates(martin.coplanar), "triaxes at the origin and on two axes, rate sensors [Martin98]"),
     "compact-cube": (_with_rates(martin.compact_cube), "one triax and rate sensors, α by differences [Martin98]"),
-    "rgla": (_with_rates(rgla.motion), "accelerometers at the origin and rate sensors [Hu77]"),
+    "rgla": (_with_rates(rgla.motion), "accelerometers at the origin and rate sensors, five-point derivative [Hu77]"),
+    "rgla-fourier": (
+        _with_rates(partial(rgla.motion, derivative="fourier")),
+        "the same, derivative of a truncated Fourier series",
+    ),
+    "rgla-lanczos": (
+        _with_rates(partial(rgla.motion, derivative="lanczos")),
+        "the same, derivative of a Fourier series with Lanczos factors",
+    ),
 }
 """Name -> function and what it does."""
 

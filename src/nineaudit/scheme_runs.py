@@ -75,6 +75,8 @@ def schemes_of(case: Case) -> dict[str, Scheme]:
         "co-planar": lambda y: martin.coplanar(array, time, y, sigma),
         "compact-cube": lambda y: martin.compact_cube(array, time, y, sigma),
         "rgla": lambda y: rgla.motion(array, time, y, sigma),
+        "rgla-fourier": lambda y: rgla.motion(array, time, y, sigma, "fourier"),
+        "rgla-lanczos": lambda y: rgla.motion(array, time, y, sigma, "lanczos"),
     }
 
 

@@ -13,11 +13,11 @@ from nineaudit.report.figures import Figure, figure
 from nineaudit.report.numbers import digits, edge, spelled
 from nineaudit.report.page import style as sheet
 from nineaudit.report.page import template
+from nineaudit.report.scheme_styles import classes, css, groups
 
 HEADERS = (
     "scheme", "curve", "unit", "r", "r 2.5 ms", "ISO 18571", "grade", "peak", "difference", "U", "ratio", "budget",
 )  # fmt: skip
-_STYLES = ("axis-x", "axis-y", "axis-z", "measured")
 _NAMES = {"alpha": "α", "omega": "ω", "a0": "a(origin)"}
 
 
@@ -63,7 +63,7 @@ def _heading(comparison: Comparison, recording: Recording) -> str:
 
 def render(comparison: Comparison, recording: Recording) -> str:
     """The page: the same table, and the curves of all schemes over each other."""
-    context: dict[str, Any] = sheet() | {
+    context: dict[str, Any] = sheet(css()) | {
         "name": recording.source.path.name,
         "rig": recording.rig.name,
         "sentence": _heading(comparison, recording),
@@ -79,15 +79,14 @@ def render(comparison: Comparison, recording: Recording) -> str:
 
 
 def figures(comparison: Comparison, recording: Recording) -> list[Figure]:
-    """Figures for each component of each quantity, four schemes at a time over the reference, which is broad."""
-    others = [name for name in comparison.curves if name != comparison.reference]
-    groups = [others[i : i + len(_STYLES)] for i in range(0, len(others), len(_STYLES))]
+    """Figures for each component of each quantity, a family of schemes over the reference, which is broad."""
+    parts = groups(name for name in comparison.curves if name != comparison.reference)
     units = {row.quantity: row.unit for row in comparison.rows}
     return [
         _figure(comparison, recording, (quantity, axis, part), group, units[quantity])
         for quantity in comparison.curves[comparison.reference]
         for axis in range(3)
-        for part, group in enumerate(groups, 1)
+        for part, group in enumerate(parts, 1)
     ]
 
 
@@ -95,11 +94,13 @@ def _figure(
     comparison: Comparison, recording: Recording, which: tuple[str, int, int], names: list[str], si: str
 ) -> Figure:
     (quantity, axis, part), (unit, one) = which, edge(si, recording.rig)
-    styles = {comparison.reference: "rebuilt", **dict(zip(names, _STYLES, strict=False))}
-    drawn = tuple(Line(comparison.curves[name][quantity][:, axis] / one, style, name) for name, style in styles.items())
+    drawn = tuple(
+        Line(comparison.curves[name][quantity][:, axis] / one, classes(name, name == comparison.reference), name)
+        for name in (comparison.reference, *names)
+    )
     title = f"{_NAMES.get(quantity, quantity)}, {'xyz'[axis]}"
     peak = f"peak of {comparison.reference} {digits(float(np.abs(drawn[0].values).max()))} {spelled(unit)}"
-    told = f"{', '.join(styles)}; {peak}."
+    told = f"{', '.join(line.label for line in drawn)}; {peak}."
     chart = Chart(f"{_key(quantity)}-{axis}-{part}", title, told, comparison.time, spelled(unit), drawn)
     return figure(chart, f"{title}, {spelled(unit)}; {peak}.")
 

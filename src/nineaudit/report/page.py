@@ -104,12 +104,12 @@ def _drawn(figure: Figure) -> Any:
     return Markup(figure.svg)
 
 
-def style() -> dict[str, Any]:
-    """The style sheet, and the policy that allows it and nothing else."""
+def style(more: str = "") -> dict[str, Any]:
+    """The style sheet, with `more` rules after it, and the policy that allows it and nothing else."""
     from markupsafe import Markup
 
     css = files("nineaudit.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    sheet = "\n" + css
+    sheet = "\n" + css + more
     digest = base64.b64encode(hashlib.sha256(sheet.encode("utf-8")).digest()).decode("ascii")
     return {
         "css": Markup(sheet),

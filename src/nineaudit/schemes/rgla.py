@@ -20,7 +20,7 @@ which takes away the ripple of the cut (Gibbs). Integrals by Simpson's rule or a
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -200,8 +200,45 @@ def spectrum(values: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArr
     return frequencies, np.abs(series.amplitudes).reshape(-1, *np.shape(values)[1:])
 
 
-def motion(array: SensorArray, time: FloatArray, readings: FloatArray, sigma: FloatArray) -> Motion:
-    """ω of the rate sensors, α by five-point least squares, a0 of the accelerometers at the origin (METHODS 1).
+def signal_terms(values: FloatArray, time: FloatArray, sigma: FloatArray) -> int:
+    """K: how many harmonics reach up to the last that rises above the noise, `sigma` (m,), of any column of `values`.
+
+    Coefficients of white noise have the standard deviation σ√(2/N); the largest of N of them stays below √(2 ln N)
+    times that (Donoho and Johnstone 1994). Errors as `sine_series`.
+    """
+    size = np.abs(sine_series(values, time).amplitudes) / sigma
+    count = size.size
+    above = np.flatnonzero((size > 2.0 * np.sqrt(np.log(count) / len(time))).any(axis=1))
+    return int(above[-1]) + 1 if above.size else 1
+
+
+Derivative = Literal["five-point", "fourier", "lanczos"]
+_SAID: Final[dict[Derivative, str]] = {
+    "five-point": "five-point derivative",
+    "fourier": "derivative of a truncated Fourier series",
+    "lanczos": "derivative of a Fourier series with Lanczos factors",
+}
+
+
+def derivative_of(omega: FloatArray, time: FloatArray, sigma: FloatArray, how: Derivative) -> FloatArray:
+    """α (n,3) from ω (n,3) of noise `sigma` (3,); the Fourier series is cut after `signal_terms`, with Lanczos factors
+    after twice as many, so that no harmonic that rises above the noise is damped by more than sinc(½), 0.64."""
+    if how == "five-point":
+        return five_point_derivative(omega, time)
+    terms = signal_terms(omega, time, sigma)
+    if how == "lanczos":
+        return fourier_derivative(omega, time, min(2 * terms, len(time) - 2), sigma=True)
+    return fourier_derivative(omega, time, terms)
+
+
+def motion(
+    array: SensorArray,
+    time: FloatArray,
+    readings: FloatArray,
+    sigma: FloatArray,
+    derivative: Derivative = "five-point",
+) -> Motion:
+    """ω of the rate sensors, α by differentiation, a0 of the accelerometers at the origin (METHODS 1).
 
     `readings` (n,k) SI zeroed, `sigma` (k,). EstimationError unless there are three axes of rate sensors and, at the
     origin, of accelerometers.
@@ -214,7 +251,9 @@ def motion(array: SensorArray, time: FloatArray, readings: FloatArray, sigma: Fl
             "RGLA needs three accelerometers at the origin", found=f"{held.size}, of rank {rank}", expected="rank 3"
         )
     a0 = bridge(readings[:, held], time) @ np.linalg.pinv(array.axes[held]).T
-    return Motion(omega, five_point_derivative(omega, time), a0, "RGLA, five-point derivative [Hu77]")
+    rates = ~array.is_accelerometer
+    noise = np.linalg.norm(np.linalg.pinv(array.axes[rates]) * sigma[rates], axis=1)
+    return Motion(omega, derivative_of(omega, time, noise, derivative), a0, f"RGLA, {_SAID[derivative]} [Hu77]")
 
 
 def even_step(time: FloatArray, least: int) -> float:
