@@ -477,6 +477,9 @@ def test_the_command_writes_what_it_says_and_prints_a_summary(run: Run) -> None:
     assert out.startswith("T1.csv: -0.025 to 0.2 s, 2251 samples at 10000 Hz; whole-record fit")
     for said in ("HIC15", "HIC36", "GSI", "a3ms", "BrIC", "CG in the laboratory", "m.parquet: 2251 samples", "  u "):
         assert said in out
+    assert "the filter that the rig states, CFC1000; do not filter to it again" in out
+    assert "gravity left as the zero leaves it, up to 2 g when the body turns over (see --gravity)" in out
+    assert "readings filtered to CFC180" in run("motion", "T1.csv", "--rig", "rig.toml", "--cfc", "180")[1]
     assert Path("m.parquet").stat().st_size > 0
     assert Path("m.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     again = run("motion", "T1.csv", "--rig", "rig.toml", "--output", "m.parquet")
@@ -498,6 +501,7 @@ def test_wrong_use_is_exit_code_2_and_says_where(run: Run) -> None:
         (("--output", "T1.csv", "--force"), "an input is never written to"),
         (("--output", "m.xls"), "no format to write a motion in"),
         (("--check-triax", "b"), "--check-triax: no triax by that name"),
+        (("--cfc", "1000"), "filtered twice: CFC1000 after CFC1000"),
     ):
         code, _, err = run(*head, *options)
         assert (code, said in err) == (2, True), err

@@ -47,7 +47,12 @@ Angles = Annotated[str, typer.Option(metavar="Y,P,R", help="Yaw, pitch, roll at 
 Velocity = Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m/s.")]
 Position = Annotated[str, typer.Option(metavar="X,Y,Z", help="Of the origin at first, m.")]
 Gravity = Annotated[
-    bool, typer.Option("--gravity", help="The sensors feel gravity (laboratory +z): put it right by the attitude.")
+    bool,
+    typer.Option(
+        "--gravity",
+        help="The sensors feel gravity (laboratory +z): put it right by the attitude, from --angles on. Without it "
+        "gravity stays as the zero leaves it: none at first, up to 2 g once the body has turned over.",
+    ),
 ]
 WorstCase = Annotated[
     str | None,
@@ -55,6 +60,10 @@ WorstCase = Annotated[
 ]
 GyroResponse = Annotated[
     str | None, typer.Option(metavar="HZ,ZETA", help="Compare ω with the rate sensors through their response: 37,0.5")
+]
+Class = Annotated[
+    float | None,
+    typer.Option(metavar="CLASS", help="Filter the readings first (SAE J211-1), as 180; refused if they were before."),
 ]
 CheckTriax = Annotated[
     str | None, typer.Option(metavar="PREFIX", help="Predict this extra triax from the others; HIC, GSI deviations.")
@@ -73,6 +82,7 @@ def motion(
     velocity: Velocity = "0,0,0",
     position: Position = "0,0,0",
     gravity: Gravity = False,
+    cfc: Class = None,
     check_triax: CheckTriax = None,
     worst_case: WorstCase = None,
     gyro_response: GyroResponse = None,
@@ -103,14 +113,28 @@ def motion(
         require_absent(place, force)
     instrument = with_points(instrument, point or [])
     start = _start(omega, angles, velocity, position, gravity)
-    case = Case(read(recording, instrument, dbc=dbc or ()))
+    case, notes = _filtered(Case(read(recording, instrument, dbc=dbc or ())), cfc)
     found = motion_of(case, method, start)
+    found = replace(found, notes=(*notes, *found.notes))
     lines = [*summary(found, instrument, recording.name), *_written(found, instrument, recording, output, html, force)]
     lines += [*_worst_case_lines(case, found, worst_case), *_gyro_lines(case, found, gyro_response)]
     if check_triax is None:
         return lines, 0
     said, passed = _triax_lines(case, check_triax, method, start)
     return [*lines, *said], 0 if passed else 1
+
+
+def _filtered(case: Case, class_: float | None) -> tuple[Case, list[str]]:
+    """The case through a class, if one is wanted, and what is to be said of filters."""
+    from nineaudit.case import Case
+    from nineaudit.filtering import filtered, note
+
+    said = note(case)
+    if class_ is None:
+        return case, [said or "no filter is stated or seen: peaks and injury values are those of unfiltered readings"]
+    behind = Case(filtered(case.recording, class_))
+    unstated = [said] if said and case.recording.rig.cfc is None else []
+    return behind, [*unstated, behind.recording.source.notes[-1]]
 
 
 def with_points(rig: Rig, texts: list[str]) -> Rig:
