@@ -5,7 +5,7 @@ The subcommands return what is to be printed. Heavy modules are imported inside 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,59 +56,48 @@ def _end(columns: str, method: str, sheet: str) -> str:
     return f"{columns} {_EACH}\n\n" + example(line, "    --output calibrated.toml")
 
 
-@calibrate_app.command(
-    "rate-table",
-    epilog=_end(_TABLE, "rate-table", "table.csv"),
-)
-def rate_table(
-    runs: Runs_,
-    rig: RigOption,
-    output: Calibrated = None,
-    gravity: Gravity = None,
-    reference_u: Reference = 0.0,
-    confidence: Confidence = 0.95,
-    single_axis: Single = False,
-    force: Force = False,
-) -> str:
-    """Several orientations and speeds on a table with a vertical axis: scale, offset, axis of every channel.
+_SAID = {
+    "rate-table": """Several orientations and speeds on a table with a vertical axis: scale, offset, axis of every
+    channel.
 
     Accelerometers feel the centripetal acceleration and gravity, rate sensors the table's rate.
-    """
-    from nineaudit.calibrating import inputs
-    from nineaudit.calibrating.sheet import read_sheet
-    from nineaudit.rig import load_rig
-
-    instrument, sheet = load_rig(rig), read_sheet(runs)
-    lines, changes = _fitted(
-        instrument, sheet, inputs.rate_table(sheet), inputs.TABLE_COLUMNS, gravity, reference_u, confidence, single_axis
-    )
-    return "\n".join([*lines, *_written(instrument, changes, sheet, "rate-table", output, [rig, runs], force)])
-
-
-@calibrate_app.command(epilog=_end(_FLIPS, "flips", "flips.csv"))
-def flips(
-    runs: Runs_,
-    rig: RigOption,
-    output: Calibrated = None,
-    gravity: Gravity = None,
-    reference_u: Reference = 0.0,
-    confidence: Confidence = 0.95,
-    single_axis: Single = False,
-    force: Force = False,
-) -> str:
-    """Six static positions, plus and minus 1 g along every body axis: scale, offset, axis of every accelerometer.
+    """,
+    "flips": """Six static positions, plus and minus 1 g along every body axis: scale, offset, axis of every
+    accelerometer.
 
     Rate sensors feel nothing in them and stay as they are.
-    """
-    from nineaudit.calibrating import inputs
-    from nineaudit.calibrating.sheet import read_sheet
-    from nineaudit.rig import load_rig
+    """,
+}
 
-    instrument, sheet = load_rig(rig), read_sheet(runs)
-    lines, changes = _fitted(
-        instrument, sheet, inputs.flips(sheet), inputs.FLIP_COLUMNS, gravity, reference_u, confidence, single_axis
-    )
-    return "\n".join([*lines, *_written(instrument, changes, sheet, "flips", output, [rig, runs], force)])
+
+def _of_sensors(method: str) -> Callable[..., str]:
+    """The command of a method by which sensors feel known inputs."""
+
+    def calibrated(
+        runs: Runs_,
+        rig: RigOption,
+        output: Calibrated = None,
+        gravity: Gravity = None,
+        reference_u: Reference = 0.0,
+        confidence: Confidence = 0.95,
+        single_axis: Single = False,
+        force: Force = False,
+    ) -> str:
+        from nineaudit.calibrating import inputs
+        from nineaudit.calibrating.sheet import read_sheet
+        from nineaudit.rig import load_rig
+
+        instrument, sheet = load_rig(rig), read_sheet(runs)
+        read, columns = inputs.METHODS[method]
+        lines, changes = _fitted(instrument, sheet, read(sheet), columns, gravity, reference_u, confidence, single_axis)
+        return "\n".join([*lines, *_written(instrument, changes, sheet, method, output, [rig, runs], force)])
+
+    calibrated.__doc__ = _SAID[method]
+    return calibrated
+
+
+calibrate_app.command("rate-table", epilog=_end(_TABLE, "rate-table", "table.csv"))(_of_sensors("rate-table"))
+calibrate_app.command("flips", epilog=_end(_FLIPS, "flips", "flips.csv"))(_of_sensors("flips"))
 
 
 @calibrate_app.command(epilog=_end(_STAIRCASE, "staircase", "staircase.csv"))

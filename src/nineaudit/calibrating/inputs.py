@@ -12,6 +12,7 @@ Held still, Ω = 0: gravity alone, ±g along the six body directions in six flip
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -75,3 +76,10 @@ def felt(sensor: Sensor, runs: Runs, gravity: float) -> FloatArray:
         return turning
     place = runs.radius[:, None] * runs.out + sensor.position
     return np.asarray(np.cross(turning, np.cross(turning, place)) + gravity * runs.up)
+
+
+METHODS: Final[Mapping[str, tuple[Callable[[Sheet], Runs], tuple[str, ...]]]] = {
+    "rate-table": (rate_table, TABLE_COLUMNS),
+    "flips": (flips, FLIP_COLUMNS),
+}
+"""By name, what reads the runs, and the columns that are not channels."""
