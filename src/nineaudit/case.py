@@ -88,6 +88,14 @@ class Case:
 
     @cached_property
     def sigma(self) -> FloatArray:
+        """(k,) deviation of a reading in the fits: `noise`, and more for channels of other clocks (Alignment)."""
+        found = self.noise.copy()
+        for a in self.recording.alignments:
+            found[self.array.index(a.channel)] = a.deviation(found[self.array.index(a.channel)])
+        return found
+
+    @cached_property
+    def noise(self) -> FloatArray:
         """(k,) noise standard deviation: the rig's, else measured in the quiet interval, else from differences.
 
         Never below a quarter of the channel's quantisation step over √3 (uniform rounding noise, GUM F.2.2.1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import hypot, sqrt
 from pathlib import Path
 
 from nineaudit.array import BoolArray, FloatArray
@@ -42,6 +43,36 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class Alignment:
+    """How a channel that was sampled by another clock came onto the common time base (readers/alignment.py).
+
+    `rate` Hz; `ratio` (p, q): p of its samples to q of the base's, the nominal ratio of the rates; `drift` (1) by how
+    much faster than that it runs, as the stamps tell, and its standard uncertainty `u_drift`. `skew` s: how long after
+    the base's nearest its samples are stamped, NaN where that changes along the record. `u_timing` s: standard
+    uncertainty of its time against the base that came with the alignment (it is in the rig's u_timing already);
+    `u_value` SI: rms error of the interpolation.
+    """
+
+    channel: str
+    rate: float
+    ratio: tuple[int, int]
+    drift: float
+    u_drift: float
+    skew: float
+    u_timing: float
+    u_value: float
+
+    def deviation(self, noise: float) -> float:
+        """What counts as the deviation of each reading on the common time base, `noise` that of one as it was taken.
+
+        Readings between the samples of a slower clock tell nothing new: white noise of the same density on the faster
+        clock is √(ratio of the rates) times as large. The error of interpolation comes with it.
+        """
+        p, q = self.ratio
+        return hypot(noise * sqrt(max(q / p, 1.0)), self.u_value)
+
+
+@dataclass(frozen=True)
 class Damage:
     """What of a file could not be read, `place` (byte, line) of the first and how many there are. What was good is
     kept: `lost` says in words what is not."""
@@ -77,7 +108,8 @@ class Recording:
 
     Columns follow ``rig.array``. Invalid readings are NaN. `native` are the traces in SI on their own clocks
     (the same arrays where the clocks agree), for checks that must see samples as they were taken; `resampled`
-    names the channels whose readings were interpolated onto the common time base.
+    names the channels whose readings were interpolated onto the common time base, `alignments` how. `rig` is the rig
+    as it was in this recording: its file's, with the timing uncertainty of the alignment added.
     """
 
     time: FloatArray
@@ -88,6 +120,7 @@ class Recording:
     native: tuple[Trace, ...]
     clocks: tuple[Clock, ...]
     resampled: tuple[str, ...] = ()
+    alignments: tuple[Alignment, ...] = ()
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -48,7 +48,7 @@ def noise_level(case: Case, *, max_ratio: float) -> Sequence[Measure] | NotAppli
 def quantisation(case: Case, *, max_ratio: float) -> Sequence[Measure]:
     """RQ206: rounding noise, step/√12 (GUM F.2.2.1), against `max_ratio` times the channel's noise."""
     out = []
-    for sensor, sigma, trace in zip(case.array.sensors, case.sigma, _in_order(case), strict=True):
+    for sensor, sigma, trace in zip(case.array.sensors, case.noise, _in_order(case), strict=True):
         step = resolution(trace.values)
         noise = float(sigma) if sigma > 1e-6 * step else 0.0  # less is rounding of the arithmetic
         out.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
@@ -10,9 +10,11 @@ import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray, frozen
 from nineaudit.errors import RecordingError
-from nineaudit.readers.clock import clock_of, in_order, reach
+from nineaudit.readers import alignment
+from nineaudit.readers.clock import clock_of, in_order
 from nineaudit.readers.contents import Contents
-from nineaudit.recording import Clock, Recording, Source, Trace
+from nineaudit.readers.resample import resample
+from nineaudit.recording import Alignment, Clock, Recording, Source, Trace
 from nineaudit.signals import si_factor
 
 if TYPE_CHECKING:
@@ -24,12 +26,14 @@ EPOCH_S: Final = 1e6
 """Later first stamps (11 days) are dates: as floating-point seconds they keep only parts of a microsecond."""
 
 
-def assemble(contents: Contents, rig: Rig, source: Source) -> Recording:
+def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str, float] | None = None) -> Recording:
     """One recording of a rig from the traces of a file.
 
     Units: what the recording states, else the rig's. Common time base: the stamps that all traces share, or those
-    of the trace with most samples, onto which the others are interpolated linearly, valid only between samples no
-    further apart than a gap. Samples whose stamp is not above all earlier ones are not used, but counted.
+    of the trace with most samples, onto which the others are interpolated (resample.py), valid only between samples no
+    further apart than a gap. What their clocks leave open about their time is added to the timing uncertainty of the
+    recording's rig (alignment.py). Samples whose stamp is not above all earlier ones are not used, but counted.
+    `u_parts`: standard uncertainty, s, of the clock of each channel whose file is one part of the recording.
     Raises RecordingError: too few samples, or no time that the traces have in common; ConfigurationError: a unit.
     """
     by_channel = {trace.channel: trace for trace in contents.traces}
@@ -39,21 +43,45 @@ def assemble(contents: Contents, rig: Rig, source: Source) -> Recording:
     usable = [in_order(trace.time) for trace in traces]
     clocks = tuple(clock_of(trace.time, used) for trace, used in zip(traces, usable, strict=True))
     native = tuple(_only(trace, used) for trace, used in zip(traces, usable, strict=True))
-    base = max(native, key=lambda trace: trace.time.size)
-    _require_samples(base, source)
-    columns = [_on(base.time, trace, clock, source) for trace, clock in zip(native, clocks, strict=True)]
+    base = max(range(len(native)), key=lambda i: native[i].time.size)
+    _require_samples(native[base], source)
+    columns, alignments = _on_one_base(native, clocks, base, source, u_parts or {})
     readings = frozen(np.column_stack(columns))
+    said = alignment.notes(alignments, native[base].channel, clocks[base].rate, _si_units(rig))
     stated = _stated_units(contents.traces, rig)
     return Recording(
-        time=base.time,
+        time=native[base].time,
         readings=readings,
         valid=_read_only(np.isfinite(readings)),
-        rig=rig,
-        source=replace(source, notes=(*source.notes, *notes, *stated)),
+        rig=alignment.with_timing(rig, alignments),
+        source=replace(source, notes=(*source.notes, *notes, *said, *stated)),
         native=native,
         clocks=clocks,
-        resampled=tuple(t.channel for t in native if not np.array_equal(t.time, base.time)),
+        resampled=tuple(a.channel for a in alignments),
+        alignments=alignments,
     )
+
+
+def _on_one_base(
+    native: Sequence[Trace], clocks: Sequence[Clock], base: int, source: Source, u_parts: Mapping[str, float]
+) -> tuple[list[FloatArray], tuple[Alignment, ...]]:
+    """The readings of every trace at the stamps of `native[base]`, and how those came there that have other stamps."""
+    time, rate = native[base].time, clocks[base].rate
+    columns, alignments = [], []
+    for trace, clock in zip(native, clocks, strict=True):
+        if np.array_equal(trace.time, time):
+            columns.append(trace.values)
+            continue
+        _require_overlap(time, trace, source)
+        values, error = resample(time, trace, clock, rate)
+        columns.append(values)
+        u_part = u_parts.get(trace.channel)
+        alignments.append(alignment.align(trace, clock, native[base], clocks[base], error, u_part))
+    return columns, tuple(alignments)
+
+
+def _si_units(rig: Rig) -> dict[str, str]:
+    return {s.channel: "m/s²" if s.kind == "accelerometer" else "rad/s" for s in rig.array.sensors}
 
 
 def _origin(traces: Sequence[Trace]) -> tuple[float, tuple[str, ...]]:
@@ -88,10 +116,7 @@ def _require_samples(base: Trace, source: Source) -> None:
         )
 
 
-def _on(time: FloatArray, trace: Trace, clock: Clock, source: Source) -> FloatArray:
-    """(n,) readings of a trace at (n,) s, NaN where no valid samples close enough lie on both sides."""
-    if np.array_equal(trace.time, time):
-        return trace.values
+def _require_overlap(time: FloatArray, trace: Trace, source: Source) -> None:
     if trace.time.size < 2 or trace.time[0] > time[-1] or trace.time[-1] < time[0]:
         found = f"{trace.time[0]:.6g} s to {trace.time[-1]:.6g} s" if trace.time.size else "no samples"
         raise RecordingError(
@@ -101,22 +126,6 @@ def _on(time: FloatArray, trace: Trace, clock: Clock, source: Source) -> FloatAr
             found=found,
             expected=f"samples between {time[0]:.6g} s and {time[-1]:.6g} s",
         )
-    return interpolate(time, trace, reach(clock))
-
-
-def interpolate(time: FloatArray, trace: Trace, furthest: float) -> FloatArray:
-    """(n,) values at (n,) s, linear between the samples on both sides; NaN where they are not within `furthest` s
-    of each other, where one is not valid, and outside. On a sample's own stamp its value, whatever is next to it.
-    """
-    right = np.clip(np.searchsorted(trace.time, time), 1, trace.time.size - 1)
-    left = right - 1
-    step = trace.time[right] - trace.time[left]
-    weight = (time - trace.time[left]) / step
-    low, high = trace.values[left], trace.values[right]
-    between = low + weight * (high - low)
-    inside = (weight >= 0) & (weight <= 1) & (step <= furthest)
-    values = np.where(inside, between, np.nan)
-    return np.where(weight == 0, low, np.where(weight == 1, high, values))
 
 
 def _stated_units(traces: Sequence[Trace], rig: Rig) -> tuple[str, ...]:
