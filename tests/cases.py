@@ -18,6 +18,7 @@ repeat = 3                    # so many stamps are those of the sample before
 quantise = {a1y = 5.0}        # step, SI
 [case.counts]                 # what the container held (CAN frames)
 frames = 1000
+[case.bus]                    # what was on a CAN bus (tests/bus_logs.py)
 [[case.waiver]]               # as in a waiver file
 rule = "RQ202"
 """
@@ -33,6 +34,7 @@ from typing import Any
 
 import numpy as np
 
+from bus_logs import bus_from
 from nineaudit.case import Case
 from nineaudit.engine import run
 from nineaudit.finding import Finding
@@ -48,7 +50,7 @@ FOLDER = Path(__file__).parents[1] / "fixtures" / "cases"
 TODAY = dt.date(2026, 6, 1)
 KEYS = {
     "name", "motion", "verdict", "channels", "preset", "rig", "faults", "seed", "rate", "imperfect", "noise",
-    "duration", "gravity", "arms", "record", "counts", "waiver",
+    "duration", "gravity", "arms", "record", "counts", "bus", "waiver",
 }  # fmt: skip
 
 
@@ -74,7 +76,8 @@ def recording_of(case: Mapping[str, Any]) -> Recording:
         gravity=case.get("gravity", False),
     ).recording
     disturbed = _disturbed(simulated, case["record"], case.get("seed", 0)) if "record" in case else simulated
-    return replace(disturbed, source=replace(disturbed.source, counts=case.get("counts", {})))
+    bus = bus_from(case["bus"]) if "bus" in case else None
+    return replace(disturbed, bus=bus, source=replace(disturbed.source, counts=case.get("counts", {})))
 
 
 def findings_of(code: str, case: Mapping[str, Any]) -> list[Finding]:

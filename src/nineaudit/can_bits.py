@@ -71,6 +71,24 @@ def raw_limits(signal: Any) -> tuple[int, int]:
     return 0, (1 << signal.length) - 1
 
 
+def room(signal: Any) -> tuple[float, float]:
+    """Smallest and largest value that a signal's bits can hold, in the database's unit."""
+    if signal.is_float:
+        most = float(np.finfo(f"f{signal.length // 8}").max)
+        return -most, most
+    ends = [raw * signal.scale + signal.offset for raw in raw_limits(signal)]
+    return float(min(ends)), float(max(ends))
+
+
+def stated_range(signal: Any) -> tuple[float, float] | None:
+    """The range its database states, as far as that is one: some databases state raw values, or nothing."""
+    low, high = room(signal)
+    stated, slack = (signal.minimum, signal.maximum), abs(signal.scale)
+    if None not in stated and low - slack <= stated[0] < stated[1] <= high + slack:
+        return max(low, float(stated[0])), min(high, float(stated[1]))
+    return None
+
+
 def encode(signal: Any, values: FloatArray, payload: ByteMatrix) -> None:
     """Put (n,) physical values into the bits of (n, bytes) payloads, rounded to the nearest raw value.
 

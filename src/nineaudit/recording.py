@@ -8,6 +8,7 @@ from math import hypot, sqrt
 from pathlib import Path
 
 from nineaudit.array import BoolArray, FloatArray
+from nineaudit.bus import Bus
 from nineaudit.rig import Rig
 
 
@@ -120,6 +121,7 @@ class Recording:
     native: tuple[Trace, ...]
     clocks: tuple[Clock, ...]
     resampled: tuple[str, ...] = ()
+    bus: Bus | None = None
     alignments: tuple[Alignment, ...] = ()
 
     @property

@@ -83,6 +83,14 @@ class Frames:
         out[held] = self.long[place[held]]
         return out
 
+    def take(self, rows: Rows) -> Frames:
+        """Some of the frames, or all in another order; a row may come twice."""
+        columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in _COLUMNS[:-1]}
+        place = np.full(len(self), -1)
+        place[self.long_rows] = np.arange(len(self.long_rows))
+        long_rows = np.flatnonzero(place[rows] >= 0)
+        return replace(self, **columns, long_rows=long_rows, long=self.long[place[rows[long_rows]]])
+
 
 def frames(
     time: Any,
@@ -122,3 +130,16 @@ def joined(parts: Sequence[Frames], **rest: Any) -> Frames:
 
 
 _COLUMNS: Final = ("time", "key", "bus", "kind", "length", "data", "long")
+
+
+def key_counts(log: Frames) -> dict[int, int]:
+    """Number of data frames of each key."""
+    keys = log.key if log.is_data.all() else log.key[log.is_data]
+    few = keys < _STANDARD
+    counts = np.bincount(keys[few], minlength=0)
+    standard = {key: int(counts[key]) for key in np.flatnonzero(counts).tolist()}
+    extended = np.unique(keys[~few], return_counts=True)
+    return standard | dict(zip(*(part.tolist() for part in extended), strict=True))
+
+
+_STANDARD: Final = 1 << 11

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from nineaudit.bus import Bus
 from nineaudit.errors import RecordingError
 from nineaudit.recording import Damage, Trace
 
@@ -19,6 +20,7 @@ class Contents:
     counts: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     damage: tuple[Damage, ...] = ()
+    bus: Bus | None = None
 
 
 def cut_short(path: Path, why: str, what_was_read: str, *, place: str | None = None) -> RecordingError:

@@ -141,12 +141,11 @@ def _frame_length(message: Any) -> int:
 
 
 def _require_room(signal: BusSignal, values: FloatArray, time: FloatArray) -> None:
-    """No value may lie outside what the signal's bits can hold, nor outside the range its database states, as far as
-    that range is one (some databases state raw values, or nothing)."""
+    """No value may lie outside what the signal's bits can hold, nor outside the range its database states."""
     bits = signal.signal
     if not signal.plain:
         raise ConfigurationError("a multiplexed signal cannot be written", place=f"signal {signal.name}")
-    low, high = _room(bits)
+    low, high = can_bits.stated_range(bits) or can_bits.room(bits)
     slack = 0.5 * abs(bits.scale)
     outside = np.flatnonzero((values < low - slack) | (values > high + slack))
     if outside.size:
@@ -157,16 +156,3 @@ def _require_room(signal: BusSignal, values: FloatArray, time: FloatArray) -> No
             found=float(values[i]),
             expected=f"{low:g} to {high:g} {bits.unit or ''}".rstrip(),
         )
-
-
-def _room(bits: Any) -> tuple[float, float]:
-    if bits.is_float:
-        most = float(np.finfo(f"f{bits.length // 8}").max)
-        return -most, most
-    ends = [raw * bits.scale + bits.offset for raw in can_bits.raw_limits(bits)]
-    low, high = min(ends), max(ends)
-    stated = bits.minimum, bits.maximum
-    slack = abs(bits.scale)
-    if None not in stated and low - slack <= stated[0] < stated[1] <= high + slack:
-        return max(low, float(stated[0])), min(high, float(stated[1]))
-    return low, high

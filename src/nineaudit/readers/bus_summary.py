@@ -1,0 +1,116 @@
+"""From the frames of a log to what they say of the bus (bus.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from nineaudit.bus import Bus, Identifier, Load
+from nineaudit.can_bits import ByteMatrix
+from nineaudit.can_database import EXTENDED, BusSignal
+from nineaudit.readers import bus_signals
+from nineaudit.readers.can_frames import ERROR, FD, OVERLOAD, Frames, Rows
+from nineaudit.readers.clock import _deviation as deviation
+
+WINDOW: Final = 0.1
+"""Seconds of the window in which the busiest load is looked for."""
+_CYCLE: Final = 1e-3
+
+
+def bus_of(log: Frames, messages: Sequence[Any], used: Container[int], bit_rate: float | None = None) -> Bus:
+    """Summary of all frames. `messages` of the databases, `used` keys that the rig takes signals from."""
+    known = {BusSignal(m, None).key: m for m in messages}
+    found = tuple(_identifier(log, rows, known, used) for rows in _groups(log))
+    seen = {x.key for x in found}
+    absent = (m.name for key, m in known.items() if key not in seen and (m.cycle_time or key in used))
+    restarts, first = _restarts(log)
+    return Bus(found, tuple(absent), restarts, first, tuple(_loads(log)), bit_rate, bool((log.kind & FD).any()))
+
+
+def _groups(log: Frames) -> Iterator[Rows]:
+    """Rows of the data frames of each identifier on each bus, in the order of the log."""
+    rows = np.flatnonzero(log.is_data)
+    label = (log.key[rows].astype(np.uint64) << np.uint64(16)) | log.bus[rows]
+    order = np.argsort(label, kind="stable")
+    ends = np.flatnonzero(np.diff(label[order])) + 1
+    if len(rows):
+        yield from np.split(rows[order], ends)
+
+
+def _identifier(log: Frames, rows: Rows, known: Mapping[int, Any], used: Container[int]) -> Identifier:
+    key, message = int(log.key[rows[0]]), known.get(int(log.key[rows[0]]))
+    time, payload, length = log.time[rows], log.payload(rows), log.length[rows]
+    steps = np.diff(time) * 1e-9
+    interval = float(np.median(steps)) if len(steps) > 1 else float("nan")
+    told = {} if message is None else _of_message(message, key, payload, length)
+    return Identifier(
+        key=key,
+        name=None if message is None else message.name,
+        bus=log.buses[log.bus[rows[0]]],
+        used=key in used,
+        frames=len(rows),
+        first=(int(time.min()) + log.origin) * 1e-9,
+        last=(int(time.max()) + log.origin) * 1e-9,
+        interval=interval,
+        jitter=deviation(steps, interval) if len(steps) > 1 else float("nan"),
+        longest=float(steps.max()) if len(steps) > 1 else float("nan"),
+        constant=bool((payload == payload[0]).all() and (length == length[0]).all()),
+        **told,
+    )
+
+
+def _of_message(message: Any, key: int, payload: ByteMatrix, length: Any) -> dict[str, Any]:
+    """What the database lets one check. Frames of another length than the message's are only counted."""
+    size = int(message.length)
+    whole = payload[length == size] if size <= payload.shape[1] else payload[:0]
+    codes = ((s.name, int(np.count_nonzero(bus_signals.unavailable(s, whole)))) for s in message.signals)
+    return {
+        "cycle": message.cycle_time * _CYCLE if message.cycle_time else None,
+        "length": size,
+        "longer": int(np.count_nonzero(length > size)),
+        "shorter": int(np.count_nonzero(length < size)),
+        "counters": tuple(bus_signals.counters(message, whole)),
+        "checksums": tuple(bus_signals.checksums(message, key, whole, size)),
+        "outside": tuple(bus_signals.outside(message, whole)),
+        "unavailable": tuple((name, n) for name, n in codes if n),
+    }
+
+
+def _restarts(log: Frames) -> tuple[int, float | None]:
+    """Stamps that lie before the one before them in the log, bus by bus; and the first of those, s."""
+    count, first = 0, None
+    for bus in np.unique(log.bus).tolist():
+        time = log.time[log.bus == bus]
+        back = np.flatnonzero(np.diff(time) < 0)
+        count += len(back)
+        if len(back):
+            at = (int(time[back[0] + 1]) + log.origin) * 1e-9
+            first = at if first is None else min(first, at)
+    return count, first
+
+
+def _loads(log: Frames) -> Iterator[Load]:
+    """Bits of a classic frame of n bytes (ISO 11898-1:2015 10.4), interframe space included: 47 + 8n, 67 + 8n with a
+    29-bit identifier; stuff bits at most ⌊(33 + 8n)/4⌋ and ⌊(53 + 8n)/4⌋ [Davis et al., Real-Time Systems 35 (2007)
+    239, eq 1]. Data frames and remote frames; FD frames by the same count, which is not theirs."""
+    extended = (log.key & np.uint32(EXTENDED)) != 0
+    carried = np.where(log.is_data, 8 * log.length.astype(np.int64), 0)
+    least = np.where(extended, 67, 47) + carried
+    most = least + (np.where(extended, 53, 33) + carried) // 4
+    sent = (log.kind & (ERROR | OVERLOAD)) == 0
+    for bus in np.unique(log.bus[sent]).tolist():
+        rows = np.flatnonzero(sent & (log.bus == bus))
+        since = log.time[rows] - log.time[rows].min()
+        windows = np.unique(since // int(WINDOW * 1e9), return_inverse=True)[1]  # a log may stand still for a year
+        low, high = (np.bincount(windows, weights=bits[rows]) for bits in (least, most))
+        yield Load(
+            bus=log.buses[bus],
+            duration=float(since.max()) * 1e-9,
+            least=float(low.sum()),
+            most=float(high.sum()),
+            window=WINDOW,
+            peak_least=float(low.max()),
+            peak_most=float(high.max()),
+        )
