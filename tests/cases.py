@@ -18,6 +18,9 @@ repeat = 3                    # so many stamps are those of the sample before
 quantise = {a1y = 5.0}        # step, SI
 [case.counts]                 # what the container held (CAN frames)
 frames = 1000
+[[case.damage]]               # what of the file could not be read (recording.Damage)
+what = "a container cannot be inflated"
+place = "byte 4711"
 [case.bus]                    # what was on a CAN bus (tests/bus_logs.py)
 [[case.waiver]]               # as in a waiver file
 rule = "RQ202"
@@ -40,7 +43,7 @@ from nineaudit.engine import run
 from nineaudit.finding import Finding
 from nineaudit.readers.assemble import assemble
 from nineaudit.readers.contents import Contents
-from nineaudit.recording import Recording
+from nineaudit.recording import Damage, Recording
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.rulebook import load_rulebook
 from nineaudit.simulate import simulate
@@ -50,7 +53,7 @@ FOLDER = Path(__file__).parents[1] / "fixtures" / "cases"
 TODAY = dt.date(2026, 6, 1)
 KEYS = {
     "name", "motion", "verdict", "channels", "preset", "rig", "faults", "seed", "rate", "imperfect", "noise",
-    "duration", "gravity", "arms", "record", "counts", "bus", "waiver",
+    "duration", "gravity", "arms", "record", "counts", "damage", "bus", "waiver",
 }  # fmt: skip
 
 
@@ -77,7 +80,9 @@ def recording_of(case: Mapping[str, Any]) -> Recording:
     ).recording
     disturbed = _disturbed(simulated, case["record"], case.get("seed", 0)) if "record" in case else simulated
     bus = bus_from(case["bus"]) if "bus" in case else None
-    return replace(disturbed, bus=bus, source=replace(disturbed.source, counts=case.get("counts", {})))
+    damage = tuple(Damage(**place) for place in case.get("damage", ()))
+    source = replace(disturbed.source, counts=case.get("counts", {}), damage=damage)
+    return replace(disturbed, bus=bus, source=source)
 
 
 def findings_of(code: str, case: Mapping[str, Any]) -> list[Finding]:

@@ -12,13 +12,13 @@ from functools import cache
 from importlib.metadata import entry_points
 from types import ModuleType
 
-from nineaudit.checks import budget, bus, bus_messages, clock, noise, offset, record, rigid_body
+from nineaudit.checks import budget, bus, bus_messages, clock, file, noise, offset, record, rigid_body
 from nineaudit.errors import ConfigurationError
 from nineaudit.finding import Measure, NotApplicable
 
 Check = Callable[..., Measure | Sequence[Measure] | NotApplicable]
 
-_MODULES: tuple[ModuleType, ...] = (clock, record, noise, bus, bus_messages, offset, rigid_body, budget)
+_MODULES: tuple[ModuleType, ...] = (file, clock, record, noise, bus, bus_messages, offset, rigid_body, budget)
 CHECKS: dict[str, Check] = {code: check for module in _MODULES for code, check in module.CHECKS.items()}
 """Of this package. Each module holds its own."""
 
