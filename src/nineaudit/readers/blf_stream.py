@@ -1,0 +1,113 @@
+"""From the contents of BLF containers to whole objects, wherever the containers cut them."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Final
+
+import numpy as np
+
+from nineaudit.readers.blf_chain import ROOM, Bytes, Places, Records, follow
+from nineaudit.readers.blf_containers import Piece
+from nineaudit.readers.losses import Losses
+
+_ZEROS: Final = bytes(ROOM)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Whole objects: `at` (m,) where they begin in `buffer`, `heads` (m,) HEAD; `begins` and `files` say which part
+    of the buffer is of which piece of the file."""
+
+    buffer: Bytes
+    at: Places
+    heads: Records
+    begins: tuple[int, ...]
+    files: tuple[tuple[int, bool], ...]
+
+    def place(self, at: int) -> str:
+        """Where in the file a byte of the buffer is: of a container its begin, and the byte of its content."""
+        part = max(bisect_right(self.begins, at) - 1, 0)
+        file, bare = self.files[part]
+        within = at - self.begins[part]
+        return f"byte {file + within}" if bare else f"byte {file}, inflated byte {within}"
+
+
+@dataclass
+class _Rest:
+    """Bytes that wait for more, and where they came from. `lost`: a container before them is lost, so that what does
+    not fit is no fault of its own."""
+
+    content: bytes = b""
+    begins: tuple[int, ...] = ()
+    files: tuple[tuple[int, bool], ...] = ()
+    synced: bool = True
+    lost: bool = False
+
+
+@dataclass
+class Stream:
+    """Objects of a log, piece by piece; what belongs to none is booked in `losses`."""
+
+    losses: Losses
+    rest: _Rest = field(default_factory=_Rest)
+
+    def batches(self, contents: Iterable[list[Piece]]) -> Iterator[Batch]:
+        """Whole objects of all contents, in the order of the file."""
+        for pieces in contents:
+            for (bare, lost), group in groupby(pieces, key=lambda piece: (piece.bare, piece.fault is not None)):
+                part = list(group)
+                self._book(part)
+                if lost:
+                    yield self._objects([], last=True)
+                    self.rest = _Rest(synced=False, lost=True)
+                elif bare:
+                    yield from self._bare(part)
+                else:
+                    yield self._objects(part)
+        yield self._objects([], last=True)
+
+    def _book(self, pieces: list[Piece]) -> None:
+        for piece in pieces:
+            if piece.fault:
+                self.losses.add(piece.fault, f"byte {piece.at}", lost=piece.stored)
+            if piece.flaw:
+                self.losses.add(piece.flaw, f"byte {piece.at}")
+
+    def _bare(self, pieces: list[Piece]) -> Iterator[Batch]:
+        """Objects outside of containers, which are no part of the stream inside."""
+        inside, self.rest = self.rest, _Rest()
+        yield self._objects(pieces, last=True)
+        self.rest = inside
+
+    def _objects(self, pieces: list[Piece], last: bool = False) -> Batch:
+        before = self.rest
+        contents = [before.content, *(piece.content for piece in pieces)]
+        ends = np.cumsum([len(content) for content in contents]).tolist()
+        begins = (*before.begins, *ends[:-1])
+        files = (*before.files, *((piece.at, piece.bare) for piece in pieces))
+        buffer = np.frombuffer(b"".join([*contents, _ZEROS]), dtype=np.uint8)
+        chain = follow(buffer, synced=before.synced, last=last)
+        batch = Batch(buffer, chain.at, chain.heads, begins, files)
+        lost = self._book_gaps(batch, chain.gaps, before.lost)
+        if chain.cut:
+            what = "the last object is not whole"
+            self.losses.add(what, batch.place(chain.tail), lost=ends[-1] - chain.tail)
+        self.rest = self._after(batch, buffer[chain.tail : ends[-1]].tobytes(), chain.tail, chain.synced)
+        self.rest.lost = lost and not len(chain.at)
+        return batch
+
+    def _after(self, batch: Batch, content: bytes, tail: int, synced: bool) -> _Rest:
+        first = max(bisect_right(batch.begins, tail) - 1, 0)
+        begins = tuple(begin - tail for begin in batch.begins[first:])
+        return _Rest(content, begins, batch.files[first:], synced)
+
+    def _book_gaps(self, batch: Batch, gaps: tuple[tuple[int, int], ...], lost: bool) -> bool:
+        for begin, end in gaps:
+            what = "rest of an object whose begin is lost" if lost else "no object where one must begin"
+            self.losses.add(what, batch.place(begin), lost=end - begin)
+            lost = False
+        return lost
