@@ -14,12 +14,12 @@ from nineaudit.array import FloatArray, SensorArray
 from nineaudit.budgets import Budget, typical
 from nineaudit.budgets.ambiguity import ambiguity
 from nineaudit.budgets.monte_carlo import scatter
-from nineaudit.case import Case
 from nineaudit.estimate import trajectory
-from nineaudit.estimate.at_their_word import Word, at_their_word, total
+from nineaudit.estimate.at_their_word import Word, at_their_word, motion_at_their_word
+from nineaudit.estimate.budget import ROWS, rows, total
 from nineaudit.estimate.calibration import SOURCES
-from nineaudit.estimate.functional import Smoothed, smoothed
-from nineaudit.estimate.motion import Motion, estimate_motion
+from nineaudit.estimate.functional import smoothed
+from nineaudit.estimate.motion import Motion
 from nineaudit.estimate.outputs import Output, at_instant, outputs
 from nineaudit.estimate.posterior import posterior
 from nineaudit.physics import rigid_body
@@ -95,31 +95,36 @@ def test_example_of_an_arm_that_is_half_a_millimetre_off() -> None:
 # --- derivatives ----------------------------------------------------------------------------------------------------
 
 
-def ways(preset: str) -> tuple[Case, Word, list[Output]]:
-    found = budget(preset)
-    assert found.word is not None
-    return found.case, found.word, found.outputs
-
-
-@pytest.mark.parametrize("preset", ["naap-3222", "naap-gyro", "triax-4", "rgla", "coplanar-3-gyro"])
+@pytest.mark.parametrize("preset", ["naap-3222", "naap-gyro", "triax-4", "triax-3", "3-2-1", "rgla", "coplanar-3-gyro"])
 def test_coefficients_are_the_derivative_of_every_output_by_the_readings(preset: str) -> None:
-    """By central differences along random directions; an output that is a maximum is smooth near its peak."""
-    case, word, reported = ways(preset)
-    blocks, rng = case.condensed, np.random.default_rng(1)
-    for output in reported:
+    """By central differences along random directions, ω fed back where it must be; an output that is a maximum is
+    smooth near its peak."""
+    found, rng = budget(preset), np.random.default_rng(1)
+    blocks, rest = found.blocks, found.rest_index
+    word = at_their_word(found.array, blocks.time, blocks.readings, blocks.sigma, rest)
+
+    def value(readings: FloatArray, output: Output) -> float:
+        return output.value(motion_at_their_word(found.array, blocks.time, readings, blocks.sigma, rest), blocks.time)
+
+    for output in found.outputs:
         by_reading = word.coefficients(output.gradient(word.motion, blocks.time))
         for _ in range(3):
-            along = 1e-4 * blocks.sigma * rng.standard_normal(blocks.readings.shape)
-            up, down = (_value(case, blocks.readings + s * along, output) for s in (1.0, -1.0))
+            along = 1e-5 * blocks.sigma * rng.standard_normal(blocks.readings.shape)
+            up, down = (value(blocks.readings + s * along, output) for s in (1.0, -1.0))
             expected = float(2.0 * (by_reading * along).sum())
             size = 2.0 * float(np.linalg.norm(by_reading * along))
             assert up - down == pytest.approx(expected, abs=0.02 * size), output.name
 
 
-def _value(case: Case, readings: FloatArray, output: Output) -> float:
-    blocks = case.condensed
-    rest = case.required_rest.start // blocks.length
-    return output.value(estimate_motion(case.array, blocks.time, readings, blocks.sigma, rest), blocks.time)
+@pytest.mark.parametrize("preset", ["naap-3222", "naap-gyro", "triax-3", "3-2-1"])
+def test_coefficients_of_the_fit_are_what_its_noise_comes_from(preset: str) -> None:
+    """Σ c²σ² is all that the calibration errors leave of the covariance, which is known without c."""
+    found = budget(preset)
+    fit = smoothed(found.fit)
+    for output in found.outputs:
+        gradient = output.gradient(fit.motion, found.blocks.time)
+        by_noise = np.sqrt((fit.coefficients(gradient) ** 2 @ found.blocks.sigma**2).sum())
+        assert by_noise == pytest.approx(fit.rows(gradient)["noise"], rel=1e-3), output.name
 
 
 @pytest.mark.parametrize("preset", ["naap-3222", "naap-gyro", "triax-3"])
@@ -162,11 +167,9 @@ DRAWS = 400
 def three(rig: Rig, reported: list[Output]) -> list[tuple[str, float, float, float, float]]:
     """Name, root sum of squares, standard deviation and bias by Monte Carlo, and uncertainty through the fit."""
     found = typical(rig)
-    word, case = found.word, found.case
+    word, fit, blocks = found.word, found.smoothed, found.blocks
     assert word is not None
-    fit: Smoothed = smoothed(case.healthy)
-    blocks = case.condensed
-    drawn = scatter(case.array, blocks.time, blocks.readings, blocks.sigma, found.rest_index, reported, DRAWS)
+    drawn = scatter(word, np.zeros(len(rig.array)), found.rest_index, reported, DRAWS)
     out = []
     for output, spread in zip(reported, drawn, strict=True):
         rss = total(word.rows(output.gradient(word.motion, blocks.time)))
@@ -175,12 +178,17 @@ def three(rig: Rig, reported: list[Output]) -> list[tuple[str, float, float, flo
     return out
 
 
-def test_three_ways_agree_where_nothing_is_redundant_and_errors_are_small() -> None:
-    """Three rate sensors and three accelerometers at the origin, errors a tenth of the usual: the fit has no more than
-    the readings, and all is linear. RSS against covariance: the peak may lie a block apart. Monte Carlo: 4 of its
-    standard errors."""
-    reported = [o for o in outputs([("", ORIGIN)]) if o.name != "peak α"]
-    for name, rss, sd, bias, by_fit in three(scaled(rig_of("rgla"), 0.1), reported):
+@pytest.mark.parametrize("preset", ["rgla", "3-2-1"])
+def test_three_ways_agree_where_nothing_is_redundant_and_errors_are_small(preset: str) -> None:
+    """Errors a hundredth of the usual, so that all is linear, noise small against how fast a peak falls off; the zero
+    known, which the fit learns from the rest before. Monte Carlo: 4 of its standard errors. RSS against covariance:
+    what the fit's midpoint rule and the scheme's steps make of 100 Hz, (ωh)²/24 = 0.1 %, and noise, which the two share
+    out differently between samples: 2 %. The α of rates, of which noise makes a hundred times as much, is left to the
+    test of its smoother."""
+    rig = scaled(rig_of(preset), 0.01)
+    rig = replace(rig, array=SensorArray(tuple(replace(s, u_zero=0.0) for s in rig.array.sensors)))
+    reported = [o for o in outputs([("", ORIGIN)]) if preset != "rgla" or o.name != "peak α"]
+    for name, rss, sd, bias, by_fit in three(rig, reported):
         assert by_fit == pytest.approx(rss, rel=0.02), name
         assert sd == pytest.approx(rss, rel=4.0 / np.sqrt(2.0 * DRAWS)), name
         assert abs(bias) < 4.0 * sd / np.sqrt(DRAWS), name
@@ -212,10 +220,11 @@ def with_only(**stated: float) -> Rig:
 
 
 def test_with_noise_alone_half_of_it_halves_everything_and_arms_halve_alpha() -> None:
-    """cov α = σ²(Σhhᵀ)⁻¹ ~ σ²/r² (METHODS 4); a single point's acceleration is told by the centre."""
+    """cov α = σ²(Σhhᵀ)⁻¹ ~ σ²/r² (METHODS 4); a single point's acceleration is told by the centre. The error of the
+    step, 1/400 of it, stays."""
     found = typical(with_only())
     changes = {change.name: change for change in found.changes}
-    assert changes["half the noise"].ratios == pytest.approx([0.5] * len(found.outputs), rel=1e-6)
+    assert changes["half the noise"].ratios == pytest.approx([0.5] * len(found.outputs), rel=1e-3)
     assert changes["arms twice as long"].ratios[0] == pytest.approx(0.5, rel=0.05)
     assert changes["three rate sensors added"].ratios[1] < 0.8
     assert not any("known twice as well" in name for name in changes)
@@ -255,19 +264,16 @@ def test_map_of_ambiguity_does_not_depend_on_the_origin() -> None:
 # --- over time ------------------------------------------------------------------------------------------------------
 
 
-def test_over_time_is_the_budget_of_alpha() -> None:
-    """The uncertainty of α by source at its peak is estimate/budget.py's, written down by other means."""
+def test_over_time_is_the_budget_of_the_instant() -> None:
+    """Three components of α at an instant, each by the same function as the lines."""
     found = budget("naap-3222")
-    curve = found.over_time.curves["α"]
-    expected = found.case.alpha_budget
-    word = found.word
-    assert word is not None
-    gradients = [at_instant("α", expected.row, i, word.motion, ORIGIN) for i in range(3)]
-    for source in (*SOURCES, "noise"):
-        here = np.linalg.norm([word.rows(g)[source] for g in gradients])
-        assert here == pytest.approx(expected.rows[source], rel=1e-6)
-    assert np.isfinite([curve[s] for s in curve]).all()
-    assert (np.diff(found.over_time.time) > 0).all()
+    over, way = found.over_time, found.way
+    place, row = len(over.time) // 2, int(np.searchsorted(found.blocks.time, over.time[len(over.time) // 2]))
+    known = [rows(way, at_instant("α", row, i, way.motion, ORIGIN), found.beyond) for i in range(3)]
+    for source in ROWS:
+        assert over.curves["α"][source][place] == pytest.approx(np.linalg.norm([k[source] for k in known]), rel=1e-12)
+    assert np.isfinite(list(over.curves["α"].values())).all()
+    assert (np.diff(over.time) > 0).all()
 
 
 # --- the command --------------------------------------------------------------------------------------------------

@@ -31,7 +31,8 @@ class Sensor:
     `position` (3,) m and unit vector `axis` (3,) in the body frame; the position of a rate sensor has no
     effect. `full_scale` (the rig file's ``range``) in m/s² or rad/s. Standard uncertainties: `u_gain`
     relative, `u_zero` and `noise` in m/s² or rad/s, `u_alignment` rad (each of two tilts), `u_position`
-    m (each coordinate), `u_timing` s. `noise` None: to be estimated from the quiet interval.
+    m (each coordinate), `u_timing` s. `noise` None: to be estimated from the quiet interval. `resolution` in m/s² or
+    rad/s, None: as the recording shows it.
     `to_si` converts a value in the rig's unit (`unit`) to SI, calibrated: the unit over `scale`. A value read is
     value·to_si − `offset`, `offset` in m/s² or rad/s.
     """
@@ -53,6 +54,7 @@ class Sensor:
     u_position: float = 0.0
     u_timing: float = 0.0
     noise: float | None = None
+    resolution: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,8 @@ from nineaudit.array import BoolArray, FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import budget, closed_form, condense
 from nineaudit.estimate import parity as parity_of
+from nineaudit.estimate.at_their_word import at_their_word
+from nineaudit.estimate.functional import smoothed
 from nineaudit.estimate.hypotheses import healthy_fit
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import Motion, bridge, estimate_motion, has_rates, product_free, resampled
@@ -159,10 +161,17 @@ class Case:
 
     @cached_property
     def alpha_budget(self) -> budget.AlphaBudget:
-        """Uncertainty of α at its peak by source, on the blocks of `condensed`."""
-        blocks = self.condensed
-        motion = self._motion_of(self.array, blocks)
-        return budget.alpha_budget(self.array, blocks.time, blocks.readings, blocks.sigma, motion)
+        """Uncertainty of the peak of α by source, by the estimator of `motion`, on the blocks of `condensed`."""
+        blocks, told = self.condensed, has_rates(self.array) or product_free(self.array)
+        start = None if self.rest is None else self.rest.start // blocks.length
+        at = self.array, blocks.time, blocks.readings, blocks.sigma, start
+        way: budget.Way = at_their_word(*at) if told else smoothed(self.healthy)
+        return budget.alpha_budget(way, blocks.time, self.beyond(way.motion))
+
+    def beyond(self, motion: Motion, simulated: bool = False) -> budget.Beyond:
+        """Errors of readings besides calibration and noise, in a motion of the blocks of `condensed`."""
+        at = None if self.rest is None else self.readings[self.rest.samples]
+        return budget.beyond(self.recording, motion, self.condensed.time, self.condensed.length, at, simulated)
 
     def _motion_of(self, array: SensorArray, blocks: condense.Condensed) -> Motion:
         start = None if self.rest is None else self.rest.start // blocks.length

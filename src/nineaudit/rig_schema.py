@@ -170,6 +170,10 @@ class UncertaintyTable(Table):
     """Noise of rate sensors, in the angular-rate unit. Default: the number of noise."""
     timing_s: Deviation | None = None
     """Time skew between channels, in s. Default: 1e-5."""
+    resolution: Positive | None = None
+    """Quantisation step (LSB) of accelerometers, in the acceleration unit. Default: what the recording shows."""
+    resolution_rate: Positive | None = None
+    """Quantisation step (LSB) of rate sensors, in the angular-rate unit. Default: what the recording shows."""
 
 
 class SensorTable(Table):
@@ -207,6 +211,8 @@ class SensorTable(Table):
     """Standard deviation of the noise, in the sensor's unit."""
     timing_s: Deviation | None = None
     """Standard uncertainty of the time skew, in s."""
+    resolution: Positive | None = None
+    """Quantisation step (LSB) of the readings, in the sensor's unit."""
 
 
 class PointTable(Table):

@@ -131,6 +131,7 @@ def _sensor(entry: _Entry, tables: RigFile) -> Sensor:
     to_si = _to_si(entry, kind, unit) / scale
     zero = _first(table.zero, default.zero_rate if is_rate else None, default.zero)
     noise = _first(table.noise, default.noise_rate if is_rate else None, default.noise)
+    resolution = _first(table.resolution, default.resolution_rate if is_rate else default.resolution)
     position_u = _first(table.position_u, default.position)
     return Sensor(
         channel=table.channel,
@@ -150,6 +151,7 @@ def _sensor(entry: _Entry, tables: RigFile) -> Sensor:
         u_position=U_POSITION if position_u is None else position_u * length,
         u_timing=_or(U_TIMING, table.timing_s, default.timing_s),
         noise=None if noise is None else noise * to_si,
+        resolution=None if resolution is None else resolution * to_si,
     )
 
 

@@ -8,33 +8,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nineaudit.array import FloatArray, Sensor, SensorArray, frozen
-from nineaudit.estimate import calibration, trajectory
-from nineaudit.estimate.at_their_word import at_their_word, total
+from nineaudit.estimate import budget, calibration, trajectory
+from nineaudit.estimate.at_their_word import at_their_word, perfect
+from nineaudit.estimate.budget import Beyond
 from nineaudit.estimate.condense import Condensed
 from nineaudit.estimate.functional import smoothed
 from nineaudit.estimate.model import Data
-from nineaudit.estimate.motion import has_rates
+from nineaudit.estimate.motion import Motion, has_rates
 from nineaudit.estimate.outputs import Output
+from nineaudit.estimate.rate_smoother import Smoother, noise_of_rates
 from nineaudit.estimate.trajectory import Fit
-from nineaudit.physics import rigid_body
 from nineaudit.simulate.instrument import DEFAULT_NOISE
 
 BETTER = 0.5
 """What is improved has half its standard uncertainty; arms are twice as long."""
+NOTHING = 0.995
+"""A change that leaves more of the uncertainty than this is not worth a line."""
 ADDED_GAIN, ADDED_ALIGNMENT = 0.005, float(np.deg2rad(0.5))
 """Gain and alignment of a rate sensor that is added: those of [uncertainty] where a rig states none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Present:
-    """The array, the fit of its record, the blocks it was fitted to, the block at rest, and whether the accelerometers
-    span α, so that the whole-record fit is the measure; else channels are taken at their word."""
+    """The array, the `motion`, the `fit` of the blocks (None: the accelerometers do not span α), the blocks, the block
+    at rest, the errors `beyond` calibration and noise, and the smoother of the rates, which then stands for the fit."""
 
     array: SensorArray
-    fit: Fit
+    motion: Motion
+    fit: Fit | None
     blocks: Condensed
     rest_index: int | None
-    spans: bool
+    beyond: Beyond
+    smoother: Smoother | None
 
 
 @dataclass(frozen=True)
@@ -51,31 +56,47 @@ class Change:
 
 
 def changes(present: Present, outputs: Sequence[Output]) -> tuple[Change, ...]:
-    """Every change that is open to the rig, the most useful first."""
-    sigma = present.blocks.sigma
-    now = _uncertainties(present, present.array, sigma, outputs)
+    """Every change that is open to the rig, the most useful first; what changes nothing is left out."""
+    now = _uncertainties(present, outputs)
     found = [
-        Change(name, tuple(float(r) for r in _uncertainties(present, array, noise, outputs) / now))
-        for name, array, noise in _variants(present.array, sigma, present.blocks.length)
+        Change(name, tuple(float(r) for r in _uncertainties(variant, outputs) / now))
+        for name, variant in _variants(present)
     ]
-    return tuple(sorted(found, key=lambda change: change.mean))
+    helps = (change for change in found if change.mean < NOTHING)
+    return tuple(sorted(helps, key=lambda change: change.mean))
 
 
-def _variants(array: SensorArray, sigma: FloatArray, length: int) -> Iterator[tuple[str, SensorArray, FloatArray]]:
+def _variants(now: Present) -> Iterator[tuple[str, Present]]:
+    array, blocks, errors = now.array, now.blocks, now.beyond
     longer = _stretched(array, 1.0 / BETTER)
-    if not np.array_equal(longer.positions, array.positions):
-        yield "arms twice as long", longer, sigma
+    if not np.allclose(longer.positions, array.positions, rtol=0.0, atol=1e-9):
+        yield "arms twice as long", replace(now, array=longer)
     for name in ("gain", "zero", "alignment", "position", "timing"):
         key = f"u_{name}"
         better = tuple(replace(s, **{key: BETTER * getattr(s, key)}) for s in array.sensors)
         if array.values(key).any():
-            yield f"{name} known twice as well", SensorArray(better), sigma
-    yield "half the noise", array, BETTER * sigma
+            yield f"{name} known twice as well", replace(now, array=SensorArray(better))
+    yield "half the noise", replace(now, blocks=replace(blocks, sigma=BETTER * blocks.sigma))
+    if errors.rounding.any():
+        yield "one more bit", replace(now, beyond=replace(errors, rounding=BETTER * errors.rounding))
+    if errors.mismatch.any():
+        yield "one filter class for all", replace(now, beyond=replace(errors, mismatch=0.0 * errors.mismatch))
     if not has_rates(array):
-        noise = DEFAULT_NOISE["gyroscope"]
-        added = tuple(_rate_sensor(axis, noise) for axis in range(3))
-        more = np.append(sigma, np.full(3, noise / np.sqrt(length)))
-        yield "three rate sensors added", SensorArray(array.sensors + added), more
+        yield "three rate sensors added", _with_rates(now)
+
+
+def _with_rates(now: Present) -> Present:
+    noise, errors, count = DEFAULT_NOISE["gyroscope"], now.beyond, len(now.blocks.time)
+    added = tuple(_rate_sensor(axis, noise) for axis in range(3))
+    more = replace(
+        errors,
+        rounding=np.append(errors.rounding, np.zeros(3)),
+        counted=np.append(errors.counted, np.zeros(3, dtype=np.bool_)),
+        mismatch=np.hstack([errors.mismatch, np.zeros((count, 3))]),
+    )
+    sigma = np.append(now.blocks.sigma, np.full(3, noise / np.sqrt(now.blocks.length)))
+    array = SensorArray(now.array.sensors + added)
+    return replace(now, array=array, blocks=replace(now.blocks, sigma=sigma), beyond=more)
 
 
 def _stretched(array: SensorArray, by: float) -> SensorArray:
@@ -100,15 +121,21 @@ def _rate_sensor(axis: int, noise: float) -> Sensor:
     )
 
 
-def _uncertainties(present: Present, array: SensorArray, sigma: FloatArray, outputs: Sequence[Output]) -> FloatArray:
-    """(o,) standard uncertainty of each output for the exact readings of `array` in the present motion."""
-    motion, time = present.fit.motion, present.blocks.time
-    a0 = np.nan_to_num(motion.a0)
-    y = rigid_body.predict(array.positions, array.axes, array.is_accelerometer, a0, motion.alpha, motion.omega)
-    if not present.spans:
-        word = at_their_word(array, time, y, sigma, present.rest_index)
-        return np.array([total(word.rows(output.gradient(word.motion, time))) for output in outputs])
-    weight = np.broadcast_to(1.0 / sigma, y.shape).copy()
-    data = Data(array, time, y, weight, calibration.prior_sds(array), present.fit.data.still)
-    known = smoothed(trajectory.fit(data, present.fit.omega, iterations=1))
-    return np.array([total(known.rows(output.gradient(motion, time))) for output in outputs])
+def _uncertainties(present: Present, outputs: Sequence[Output]) -> FloatArray:
+    """(o,) standard uncertainty of each output for the exact readings of the array in the present motion."""
+    way, time = _way(present), present.blocks.time
+    found = [budget.rows(way, output.gradient(way.motion, time), present.beyond) for output in outputs]
+    return np.array([budget.total(rows) for rows in found])
+
+
+def _way(present: Present) -> budget.Way:
+    array, blocks = present.array, present.blocks
+    y = perfect(array, present.motion)
+    if present.fit is None:
+        word = at_their_word(array, blocks.time, y, blocks.sigma, present.rest_index)
+        if present.smoother is None:
+            return word
+        return word.smooth(replace(present.smoother, sigma=noise_of_rates(array, blocks.sigma)))
+    weight = np.broadcast_to(1.0 / blocks.sigma, y.shape).copy()
+    data = Data(array, blocks.time, y, weight, calibration.prior_sds(array), present.fit.data.still)
+    return smoothed(trajectory.fit(data, present.fit.omega, iterations=1))

@@ -39,7 +39,7 @@ def charts(budget: Budget) -> list[Chart]:
 
 
 def _way(budget: Budget) -> str:
-    return "channels taken at their word" if budget.word is not None else "through the whole-record fit"
+    return "channels taken at their word" if budget.way is budget.word else "through the whole-record fit"
 
 
 def _chart(kind: str, time: FloatArray, rows: dict[str, FloatArray], way: str) -> Chart:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from nineaudit.case import Case
-from nineaudit.errors import EstimationError
-from nineaudit.estimate import budget
+from nineaudit.estimate.at_their_word import spans
+from nineaudit.estimate.motion import has_rates
 from nineaudit.finding import Measure, NotApplicable
 
 
 def alpha_uncertainty(case: Case, *, part_of_peak: float) -> Measure | NotApplicable:
-    """UB401: expanded uncertainty (k = 2) of α at its peak, as a part of the peak [METHODS.md 5]."""
-    try:
-        budget.alpha_combination(case.array)
-    except EstimationError as reason:
-        return NotApplicable(f"the accelerometers do not give α: {reason}")
-    blocks = case.condensed
+    """UB401: expanded uncertainty (k = 2) of the peak of α, as a part of it, as `nineaudit budget` has it."""
+    if not (has_rates(case.array) or spans(case.array)):
+        count = int(case.array.is_accelerometer.sum())
+        return NotApplicable(f"{count} accelerometers do not span α, and no rate sensors on three axes give it")
     found = case.alpha_budget
     largest = max(found.rows, key=lambda source: found.rows[source])
-    time = float(blocks.time[found.row])
+    time = float(case.condensed.time[found.row])
     return Measure(
         value=2.0 * found.total / found.peak,
         limit=part_of_peak,

@@ -1,61 +1,140 @@
-"""Error-propagation budget of α (METHODS.md 5; root sum of squares, GUM 5.1.2; Martin98 eq 22).
+"""Error-propagation budget of an output, by source (METHODS 5; root sum of squares, GUM 5.1.2; Martin98 eq 22).
 
-α = L y with L product-free where the array has such a combination, else K of the least squares, so each source
-of channel i contributes L_i δy_i(t), with δy_i the calibration columns of one standard deviation.
+An estimator about a motion gives each output a coefficient c for every reading. Sources, each a row:
+
+    gain, zero, alignment, position, timing    calibration errors of one standard deviation        calibration.py
+    noise           √Σ c²σ²
+    quantisation    √Σ c²(step/√12)²/m for means of m samples, each rounded by itself              [GUM F.2.2.1]
+    filters         |Σ c δy|, δy what a class other than that of most channels does                mismatch.py
+    integration     what the finite step does, from steps twice as long or the curve in a block
+
+The last two are known in sign but not put right, and count as their size (GUM F.2.4.5). The measurand of a peak is the
+length of the vector where it is longest, so that its derivative is the direction there (GUM 5.1.3): errors across it do
+not count. One function, `rows`, is behind `nineaudit budget` and rule UB401.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from nineaudit.array import FloatArray, SensorArray
+from nineaudit.array import BoolArray, FloatArray
 from nineaudit.errors import EstimationError
-from nineaudit.estimate import calibration
-from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, has_rates
-from nineaudit.physics import rigid_body
+from nineaudit.estimate import calibration, mismatch
+from nineaudit.estimate.at_their_word import perfect
+from nineaudit.estimate.evidence import resolution
+from nineaudit.estimate.mismatch import Class
+from nineaudit.estimate.motion import Motion
+from nineaudit.estimate.outputs import Gradient, peak_alpha
+from nineaudit.recording import Recording
+
+BEYOND = ("quantisation", "filters", "integration")
+ROWS = (*calibration.SOURCES, "noise", *BEYOND)
+"""Every row of a budget."""
+DRAWN = (*calibration.SOURCES, "noise", "quantisation")
+"""The rows that differ from draw to draw of an instrument."""
+
+Rows = dict[str, float]
+
+
+class Way(Protocol):
+    """An estimator about a motion: at_their_word.Word or functional.Smoothed."""
+
+    @property
+    def motion(self) -> Motion:
+        """ω, α and a0 at the samples."""
+
+    def coefficients(self, gradient: Gradient) -> FloatArray:
+        """(n,k) what one unit of each reading adds to an output with this gradient."""
+
+    def rows(self, gradient: Gradient) -> Rows:
+        """Its standard uncertainty by calibration and noise."""
+
+    def step_error(self, gradient: Gradient) -> float:
+        """What the finite step does to it, absolute."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beyond:
+    """Errors of readings besides calibration and noise, SI: `rounding` (k,) of a block mean, standard deviation,
+    `counted` (k,) where the noise holds it already, and `mismatch` (n,k) what other filters do. `step` (k,) by which
+    readings are quantised, 0: not; `classes` (k,) filter class of each channel."""
+
+    rounding: FloatArray
+    counted: BoolArray
+    mismatch: FloatArray
+    step: FloatArray
+    classes: tuple[Class, ...]
+
+
+def beyond(
+    recording: Recording,
+    motion: Motion,
+    time: FloatArray,
+    length: int,
+    rest: FloatArray | None,
+    simulated: bool = False,
+) -> Beyond:
+    """What is beyond calibration and noise in a recording: `motion` of its blocks at `time` (n,) s of `length` samples,
+    `rest` the readings (m,k) of the quiet interval, zeroed, None where there is none. Of a recording `simulated` for a
+    budget only the step that the rig states counts."""
+    array = recording.rig.array
+    step = np.nan_to_num(array.values("resolution")) if simulated else steps(recording)
+    one = step / np.sqrt(12.0)
+    seen: tuple[Class, ...] = (recording.rig.cfc,) * len(array)
+    if rest is not None:
+        seen = mismatch.classes(rest, recording.rate, recording.rig.cfc, one)
+    y = perfect(array, motion)
+    changed = mismatch.change(y, time, recording.rate, seen)
+    measured = np.array([s.noise is None for s in array.sensors])
+    return Beyond(one / np.sqrt(length), measured, changed, step, seen)
+
+
+def steps(recording: Recording) -> FloatArray:
+    """(k,) quantisation step of every channel, SI: the rig's, else the recording's; 0 where it is not quantised."""
+    traces = {trace.channel: trace for trace in recording.native}
+    stated = recording.rig.array.values("resolution")
+    found = [resolution(traces[name].values) for name in recording.channels]
+    return np.where(np.isfinite(stated), stated, found)
+
+
+def rows(way: Way, gradient: Gradient, errors: Beyond) -> Rows:
+    """Standard uncertainty of an output with this gradient, by ROWS."""
+    known, by_reading = way.rows(gradient), way.coefficients(gradient)
+    rounded = (by_reading**2).sum(axis=0) * errors.rounding**2
+    noise = known["noise"] ** 2 - float(rounded[errors.counted].sum())
+    return known | {
+        "noise": float(np.sqrt(max(noise, 0.0))),
+        "quantisation": float(np.sqrt(rounded.sum())),
+        "filters": abs(float((by_reading * errors.mismatch).sum())),
+        "integration": way.step_error(gradient),
+    }
+
+
+def total(found: Rows) -> float:
+    """Root of the summed squares of a budget's rows."""
+    return float(np.sqrt(sum(value**2 for value in found.values())))
 
 
 @dataclass(frozen=True, eq=False)
 class AlphaBudget:
-    """Standard uncertainty of α at its peak, rad/s²: `peak` |α|, its sample `row`, and `rows` by source, the
-    root of the summed squares of the three components; `total` of them all."""
+    """Standard uncertainty of the peak of α, rad/s²: the `peak` |α|, its sample `row`, `rows` by source along the
+    direction of the peak, and `total` of them all."""
 
     peak: float
     row: int
-    rows: dict[str, float]
+    rows: Rows
     total: float
 
 
-def alpha_combination(array: SensorArray) -> FloatArray:
-    """(3,a) rows that give α from the accelerometers: product-free if there is one, else least squares.
-
-    EstimationError where the accelerometers do not span α.
-    """
-    held = array.is_accelerometer
-    positions, axes = array.positions[held], array.axes[held]
-    design = rigid_body.design(positions, axes)
-    if has_rates(array) and len(design) and np.linalg.matrix_rank(design, tol=1e-6) == 6:
-        return np.asarray(np.linalg.pinv(design)[3:])
-    return rigid_body.product_free_alpha(positions, axes, leak=OFF_IDEAL)
-
-
-def alpha_budget(
-    array: SensorArray, time: FloatArray, readings: FloatArray, sigma: FloatArray, motion: Motion
-) -> AlphaBudget:
-    """Budget of α where |α| peaks. `readings` (n,k) SI zeroed, `sigma` (k,) their noise."""
-    combination = alpha_combination(array)
-    size = np.linalg.norm(motion.alpha, axis=1)
-    row = int(np.argmax(size))
-    patterns = calibration.all_columns(array, bridge(readings, time), time, motion)[array.is_accelerometer, row]
-    reach = (combination**2).sum(axis=0)
-    parts = {
-        source: float(np.sqrt(sum(reach @ patterns[:, calibration.PARAMETERS.index(m)] ** 2 for m in members)))
-        for source, members in calibration.SOURCES.items()
-    }
-    parts["noise"] = float(np.sqrt(reach @ sigma[array.is_accelerometer] ** 2))
-    total = float(np.sqrt(sum(v**2 for v in parts.values())))
-    if not np.isfinite(total):
+def alpha_budget(way: Way, time: FloatArray, errors: Beyond) -> AlphaBudget:
+    """Budget of the largest |α| of the motion that `way` is about, at `time` (n,) s. EstimationError where it is not
+    finite."""
+    size = np.linalg.norm(way.motion.alpha, axis=1)
+    found = rows(way, peak_alpha().gradient(way.motion, time), errors)
+    if not np.isfinite(total(found)):
         raise EstimationError("the budget of α is not finite; a position, axis or reading is missing")
-    return AlphaBudget(float(size[row]), row, parts, total)
+    row = int(np.argmax(size))
+    return AlphaBudget(float(size[row]), row, found, total(found))
