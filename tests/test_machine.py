@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
+from bus_logs import bus_from
 from nineaudit import report
 from nineaudit.errors import RecordingError
 from nineaudit.finding import Finding, Measure, Severity, Verdict
@@ -33,6 +34,19 @@ def test_document_meets_its_schema(make: Any, validator: Draft202012Validator) -
     document = json.loads(report.to_json(report.result_document(make())))
     validator.validate(document)
     assert document["schema"] == "nineaudit/result/1"
+
+
+def test_a_bus_is_in_the_document_identifier_by_identifier(validator: Draft202012Validator) -> None:
+    audit = example()
+    bus = bus_from(
+        {"send": [{"id": 16, "cycle": 0.01, "frames": 100, "skip": [50]}, {"id": 99, "cycle": 1.0, "frames": 2}]}
+    )
+    document = report.result_document(replace(audit, recording=replace(audit.recording, bus=bus)))
+    validator.validate(json.loads(report.to_json(document)))
+    imu, other = document["bus"]["identifiers"]
+    assert (imu["id"], imu["name"], imu["frames"], imu["cycle"]) == ("0x10", "IMU", 99, 0.01)
+    assert imu["counters"] == [{"signal": "COUNTER", "missing": 1, "repeated": 0}]
+    assert (other["name"], other["interval"]) == (None, None)
 
 
 def test_failure_document_meets_the_schema(validator: Draft202012Validator) -> None:

@@ -67,9 +67,14 @@ class Identifier:
     unavailable: tuple[tuple[str, int], ...] = ()
 
     @property
+    def number(self) -> str:
+        """``0x24``, with three digits at most where it has 11 bits and eight where it has 29."""
+        return f"0x{self.key & 0x1FFFFFFF:08X}" if self.key >> 31 else f"0x{self.key:X}"
+
+    @property
     def label(self) -> str:
         """``0x24 KINEMATICS``."""
-        return f"0x{self.key & 0x1FFFFFFF:X}{f' {self.name}' if self.name else ''}"
+        return f"{self.number} {self.name}" if self.name else self.number
 
 
 @dataclass(frozen=True)

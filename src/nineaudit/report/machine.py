@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.finding import COVERAGE_FACTOR, Finding
+from nineaudit.report.bus_document import bus_document
 from nineaudit.report.findings import channels
 from nineaudit.report.numbers import at_edge, edge, instant, plain, sensor_edge
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from nineaudit.rig import Rig
 
 SCHEMA = "nineaudit/result/1"
-_BUS_FORMATS = frozenset({"blf", "asc", "log", "trc", "mf4", "candump", "can"})
 
 
 def result_schema() -> dict[str, Any]:
@@ -47,7 +47,7 @@ def result_document(audit: Audit) -> dict[str, Any]:
         "diagnosis": _diagnosis(audit.diagnosis, rig),
         "reconstruction": _reconstruction(audit),
         "impact": {name: _impact(impact, rig) for name, impact in audit.impact.items()},
-        "bus": _bus(audit.recording),
+        "bus": bus_document(audit.recording),
     }
 
 
@@ -159,9 +159,3 @@ def _impact(impact: Any, rig: Rig) -> dict[str, Any]:
     unit, one = edge(impact.unit, rig)
     numbers = {name: getattr(impact, name) for name in ("before", "after", "u")}
     return {name: None if v is None else plain(v / one) for name, v in numbers.items()} | {"unit": unit}
-
-
-def _bus(recording: Recording) -> dict[str, Any]:
-    counts = recording.source.counts
-    is_bus = recording.source.format.lower() in _BUS_FORMATS or "frames" in counts
-    return dict(plain(counts)) if is_bus else {}
