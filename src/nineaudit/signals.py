@@ -18,7 +18,7 @@ MCAP_ORIGIN: Final = "time_origin_ns"
 """Our metadata key in an MCAP log, whose times cannot be negative: nanoseconds to add to every log time."""
 CAN_ORIGIN: Final = "nineaudit time origin {} s"
 """Our note in a CAN log, for the same reason: seconds to add to every stamp."""
-_TIME_UNIT = re.compile(r"[_ \[(](s|ms|us|µs|ns)[\])]?$")
+_TIME_UNIT = re.compile(r"[_ \[(](s|sec|seconds?|ms|msec|us|µs|ns)[\])]?$")
 
 
 def time_unit(name: str, stated: str | None) -> str | None:

@@ -2,67 +2,92 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nineaudit.array import FloatArray, frozen
+from nineaudit.array import FloatArray
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import Contents
-from nineaudit.recording import Trace
+from nineaudit.readers.dialect import base
+from nineaudit.readers.preamble import TIME_NAME, unit_in_name
+from nineaudit.recording import Damage, Trace
 from nineaudit.signals import suggestion, time_unit
 from nineaudit.units import factor
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
 
-_TIME_NAME = re.compile(r"(t|time|timestamp|zeit)([_ ]?[\[(]?(s|ms|us|µs|ns)[\])]?)?", re.IGNORECASE)
-
 
 @dataclass(frozen=True)
 class Columns:
-    """Where a table keeps what a rig asks for: `time` and `channels` count from 0; `scale` s in the time's unit."""
+    """Where a table keeps what a rig asks for: `time` and `channels` count from 0; `scale` s in the time's unit.
+
+    `time` None: no column is that. `units` of the channels, None where the table does not say.
+    """
 
     names: tuple[str, ...]
-    time: int
-    scale: float
+    time: int | None
     channels: tuple[int, ...]
-    notes: tuple[str, ...]
+    units: tuple[str | None, ...]
+    scale: float = 1.0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def wanted(self) -> tuple[int, ...]:
+        """The columns to be read: time, if there is one, before the channels."""
+        return self.channels if self.time is None else (self.time, *self.channels)
 
 
-def locate(rig: Rig, names: Sequence[str], path: Path, place: str) -> Columns:
-    """Find the rig's signals among the `names` of a table; raises RecordingError where one is missing or doubled."""
-    time = _time_column(rig, names, path, place)
-    stated = time_unit(names[time], rig.time_unit)
-    unsaid = f"time {names[time]!r} is taken as seconds: neither its name nor the rig gives a unit"
-    return Columns(
-        names=tuple(names),
-        time=time,
-        scale=factor(stated or "s", "time"),
-        channels=tuple(_find(names, s.signal, f"channel {s.channel!r}", path, place) for s in rig.array.sensors),
-        notes=() if stated else (unsaid,),
-    )
+def locate(rig: Rig, names: Sequence[str], path: Path, place: str, *, timeless: bool = False) -> Columns:
+    """Find the rig's signals among the `names` of a table; raises RecordingError where one is missing or doubled.
+
+    `timeless`: a table without a column of time is none the worse, unless the rig names one.
+    """
+    time = _time_column(rig, names, path, place, timeless)
+    channels = tuple(_find(names, s.signal, f"channel {s.channel!r}", path, place) for s in rig.array.sensors)
+    units = tuple(unit_in_name(names[i], s.kind) for i, s in zip(channels, rig.array.sensors, strict=True))
+    return with_units(Columns(tuple(names), time, channels, units), rig, {})
+
+
+def with_units(columns: Columns, rig: Rig, stated: Mapping[int, str]) -> Columns:
+    """The columns with the units that the table states for some of them. Of time, the rig's and that of its name come
+    first; where nothing says it, a note does."""
+    units = tuple(stated.get(i) or unit for i, unit in zip(columns.channels, columns.units, strict=True))
+    if columns.time is None:
+        return replace(columns, units=units)
+    name = columns.names[columns.time]
+    unit = time_unit(name, rig.time_unit) or stated.get(columns.time)
+    unsaid = f"time {name!r} is taken as seconds: neither its name nor the rig gives a unit"
+    scale = factor(unit or "s", "time", place=f"column {name!r}")
+    return replace(columns, units=units, scale=scale, notes=() if unit else (unsaid,))
 
 
 def contents(
-    rig: Rig, columns: Columns, time: FloatArray, values: Sequence[FloatArray], notes: Iterable[str]
+    rig: Rig,
+    columns: Columns,
+    time: FloatArray,
+    values: Sequence[FloatArray],
+    notes: Iterable[str],
+    damage: Iterable[Damage] = (),
 ) -> Contents:
     """Traces of one clock: `time` (n,) in the table's unit, `values` one (n,) a channel; no number is NaN.
 
-    Rows without a time stamp are left out and counted; so are, without being left out, cells without a number.
+    The arrays become those of the traces. Rows without a time stamp are left out and counted; so are, without being
+    left out, cells without a number.
     """
     placed = np.isfinite(time)
-    stamps = frozen(time[placed] * columns.scale)
-    readings = [np.where(np.isfinite(v), v, np.nan)[placed] for v in values]
-    traces = tuple(
-        Trace(sensor.channel, sensor.signal, stamps, frozen(v))
-        for sensor, v in zip(rig.array.sensors, readings, strict=True)
-    )
     unplaced = int(np.count_nonzero(~placed))
+    stamps = time[placed] if unplaced else time
+    stamps = _read_only(stamps if columns.scale == 1.0 else stamps * columns.scale)
+    readings = [_read_only(_finite(v[placed] if unplaced else v)) for v in values]
+    traces = tuple(
+        Trace(sensor.channel, sensor.signal, stamps, v, unit)
+        for sensor, v, unit in zip(rig.array.sensors, readings, columns.units, strict=True)
+    )
     counts = {
         "rows": time.size,
         "columns": len(columns.names),
@@ -70,7 +95,7 @@ def contents(
         "rows_without_time": unplaced,
     }
     lost = (f"{unplaced} rows without a time stamp are left out",) if unplaced else ()
-    return Contents(traces, counts, (*columns.notes, *notes, *lost))
+    return Contents(traces, counts, (*columns.notes, *notes, *lost), tuple(damage))
 
 
 def floats(column: Any) -> FloatArray:
@@ -87,24 +112,38 @@ def floats(column: Any) -> FloatArray:
     return np.concatenate(parts) if parts else np.empty(0)
 
 
-def _time_column(rig: Rig, names: Sequence[str], path: Path, place: str) -> int:
+def _finite(values: FloatArray) -> FloatArray:
+    infinite = np.isinf(values)
+    return np.where(infinite, np.nan, values) if infinite.any() else values
+
+
+def _read_only(values: FloatArray) -> FloatArray:
+    values.setflags(write=False)
+    return values
+
+
+def _time_column(rig: Rig, names: Sequence[str], path: Path, place: str, timeless: bool) -> int | None:
     if rig.time_signal is not None:
         return _find(names, rig.time_signal, "time", path, place)
-    found = [name for name in names if _TIME_NAME.fullmatch(name)]
-    if not found:
-        raise RecordingError(
-            "no time column",
-            file=path,
-            place=place,
-            found=", ".join(names[:8]),
-            expected="a column such as time_s",
-            advice="name it in the rig file ([recording] time)",
-        )
-    return _find(names, found[0], "time", path, place)
+    found = [name for name in names if TIME_NAME.fullmatch(name)]
+    if found:
+        return _find(names, found[0], "time", path, place)
+    if timeless:
+        return None
+    raise RecordingError(
+        "no time column",
+        file=path,
+        place=place,
+        found=", ".join(names[:8]),
+        expected="a column such as time_s",
+        advice="name it in the rig file ([recording] time)",
+    )
 
 
 def _find(names: Sequence[str], signal: str, what: str, path: Path, place: str) -> int:
+    """The column of that name; where there is none, the one that is named so but for a unit in brackets."""
     hits = [i for i, name in enumerate(names) if name == signal]
+    hits = hits or [i for i, name in enumerate(names) if base(name) == signal]
     if len(hits) == 1:
         return hits[0]
     if hits:
