@@ -14,6 +14,7 @@ from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.estimate import parity, trajectory
+from nineaudit.estimate.deferred import deferred
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, estimate_motion, has_rates
 from nineaudit.estimate.samples import Samples, at_samples
 from nineaudit.physics import kinematics, nap, rigid_body
@@ -53,7 +54,7 @@ def by_fit(case: Case, start: Start) -> Samples:
             advice="use --method rates" if rates else "see nineaudit budget for what the array can tell",
         )
     found = case.healthy if start.omega is None else trajectory.fit(case.fit_data, _from(case, start.omega))
-    return at_samples(found, case.time, case.readings, case.sigma)
+    return at_samples(deferred(found), case.time, case.readings, case.sigma)
 
 
 def _from(case: Case, omega: Vector) -> FloatArray:

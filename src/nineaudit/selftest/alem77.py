@@ -1,7 +1,7 @@
 """Alem 1977: the motion of Table 1 through the whole of NINACC; an extra triax predicted (METHODS 7.1, 7.2).
 
 Both ends are independent: the motion is differentiated by hand (simulate/published.py), the way back is least squares,
-predictor–corrector, attitude and two integrations.
+ω by predictor–corrector or by the whole-record smoother, attitude and two integrations.
 """
 
 from __future__ import annotations
@@ -11,6 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from nineaudit.array import FloatArray, Sensor, SensorArray
+from nineaudit.estimate.deferred import deferred
+from nineaudit.estimate.model import Data
+from nineaudit.estimate.motion import Motion
+from nineaudit.estimate.samples import at_samples
+from nineaudit.estimate.trajectory import fit
 from nineaudit.physics import kinematics, laboratory, rigid_body
 from nineaudit.presets import preset_text
 from nineaudit.rig import parse_rig
@@ -39,18 +44,29 @@ def array() -> SensorArray:
     return SensorArray(tuple(Sensor(name, "accelerometer", place, axis, name) for name, place, axis in parts))
 
 
-def deviations() -> dict[str, float]:
-    """Largest deviation of a component, per cent of that component's peak, over the 2 s of Table 1 at 1600 Hz."""
+def deviations(smoothed: bool = False) -> dict[str, float]:
+    """Largest deviation of a component, per cent of that component's peak, over the 2 s of Table 1 at 1600 Hz; ω by the
+    predictor–corrector, or `smoothed`."""
     truth, (euler, shift) = alem(RATE), alem_path(RATE)
     nine = array()
     every = np.ones(9, dtype=np.bool_)
     readings = rigid_body.predict(nine.positions, nine.axes, every, truth.a0, truth.alpha, truth.omega)
     got = ninacc.forward(nine, truth.time, readings, truth.omega[0])
+    if smoothed:
+        got = _smoothed(nine, truth.time, readings, got.omega)
     attitude = kinematics.orientation(got.omega, truth.time, laboratory.attitude_of(euler[0][0]))
     a, v, x = laboratory.origin_path(truth.time, got.a0, attitude, shift[1][0], shift[0][0])
     pairs = [(got.alpha, truth.alpha), (got.omega, truth.omega), (laboratory.euler_of(attitude), euler[0])]
     pairs += [(a, shift[2]), (v, shift[1]), (x, shift[0])]
     return {name: _worst(*pair) for name, pair in zip(DEVIATIONS, pairs, strict=True)}
+
+
+def _smoothed(nine: SensorArray, time: FloatArray, readings: FloatArray, near: FloatArray) -> Motion:
+    """By the whole-record fit from ω `near` (n,3), the instrument at its word; ω is known of no sample."""
+    weight, certain = np.full(readings.shape, 1.0 / ROUNDING), np.zeros((len(nine), 8))
+    data = Data(nine, time, readings, weight, certain, np.zeros(len(time) + 1))
+    nodes = np.vstack([near[:1], 0.5 * (near[1:] + near[:-1]), near[-1:]])
+    return at_samples(deferred(fit(data, nodes)), time, readings, np.full(len(nine), ROUNDING)).motion
 
 
 def _worst(got: FloatArray, true: FloatArray) -> float:
@@ -71,9 +87,10 @@ def predicted_sled(seed: int = 1977) -> extra_triax.Prediction:
 
 def checks() -> list[Published]:
     """Table 1, its peaks, the growth by feedback, and the extra triax."""
-    found = deviations()
+    ways = (("", deviations()), (" by the smoother", deviations(smoothed=True)))
     out = [
-        Published(SOURCE, f"Table 1, deviation of {name}, % of peak", limit, found[name], 0.0, limit, _OWN)
+        Published(SOURCE, f"Table 1, deviation of {name}{way}, % of peak", limit, found[name], 0.0, limit, _OWN)
+        for way, found in ways
         for name, limit in DEVIATIONS.items()
     ]
     truth = alem(RATE)

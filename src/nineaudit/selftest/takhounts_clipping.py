@@ -186,7 +186,7 @@ def _disagreeing() -> Published:
     limits = [5.0 * NOISE * np.hypot(1.0, nap.noise_gain(name, arms)) for name in nap.CHANNELS]
     count = sum(float(np.abs(part).max()) > limit for part, limit in zip(left, limits, strict=True))
     label = "clipped a1y: traces of nine that leave their reconstruction by 5 times its noise"
-    return Published(SOURCE, label, "1 (the one to replace)", count, 9.0, 0.5, "a count")
+    return Published(SOURCE, label, "1 (the one to replace)", float(count), 9.0, 0.5, "a whole number")
 
 
 def _audited() -> list[Published]:

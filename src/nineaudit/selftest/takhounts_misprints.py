@@ -194,7 +194,7 @@ def checks() -> list[Published]:
         if m.equation in MISPRINTS
     ]
     listed = "eq 22a, rank of H with a1x and a2y as listed (6 with the right nine)"
-    out.append(Published(SOURCE, listed, "6 (nine channels)", rank_as_listed(), 5, 0.5, "a rank is a whole number"))
+    out.append(Published(SOURCE, listed, "6 (nine channels)", float(rank_as_listed()), 5.0, 0.5, "a whole number"))
     out += put_right(m for m in found if _WORDS.get(m.equation) is not _PROFUSE)
     return [*out, *_closed_forms()]
 
