@@ -29,6 +29,8 @@ from nineaudit.physics import rigid_body
 
 LARGEST_CONDITION: Final = 1e6
 """Of H, lengths in units of the array's size: beyond, a part in a million of geometry decides over α."""
+POOR_CONDITION: Final = 100.0
+"""Of the same H: beyond, α rests on a hundredth of the array's size, which alignment to 0.5° does not hold."""
 UNEVEN: Final = 1e-3
 """Largest relative difference of sampling steps that counts as uniform."""
 _STARTER = np.array([[0, 0, 0, 0], [9, 19, -5, 1], [8, 32, 8, 0], [9, 27, 27, 9]]) / 24.0
@@ -123,7 +125,18 @@ def forward(
     y = bridge(readings[:, held], time)
     omega = predictor_corrector(y @ solved.k[3:].T, solved.products[3:], step, omega0)
     state = (y - rigid_body.centripetal(positions, axes, omega)) @ solved.k.T
-    return Motion(omega, state[:, 3:], state[:, :3], "NINACC: least squares, ω by predictor–corrector [Alem77]")
+    method = "NINACC: least squares, ω by predictor–corrector [Alem77]"
+    return Motion(omega, state[:, 3:], state[:, :3], method + _poor(solved.condition))
+
+
+def _poor(condition: float) -> str:
+    """A warning where the layout hardly determines α, else nothing."""
+    if condition <= POOR_CONDITION:
+        return ""
+    return (
+        f"; H of condition number {condition:.2g}, over {POOR_CONDITION:g}: the accelerometers lie nearly on one line and"
+        " hardly see the turning about it, α and ω are mostly error: move one of them off the line"
+    )
 
 
 def predictor_corrector(free: FloatArray, products: FloatArray, step: float, omega0: FloatArray) -> FloatArray:
