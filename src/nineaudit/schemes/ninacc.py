@@ -134,8 +134,8 @@ def _poor(condition: float) -> str:
     if condition <= POOR_CONDITION:
         return ""
     return (
-        f"; H of condition number {condition:.2g}, over {POOR_CONDITION:g}: the accelerometers lie nearly on one line and"
-        " hardly see the turning about it, α and ω are mostly error: move one of them off the line"
+        f"; H of condition number {condition:.2g}, over {POOR_CONDITION:g}: the accelerometers lie nearly on one line"
+        " and hardly see the turning about it, α and ω are mostly error: move one of them off the line"
     )
 
 
