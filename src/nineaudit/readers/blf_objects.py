@@ -97,16 +97,18 @@ def _classic(group: Group) -> Found:
     record = group.record
     kind = _FLAGS[record["flags"]]
     group.odd(REQUESTS, _count(record["flags"] & _DIRECTION == _REQUEST))
-    length = _short(record["dlc"], group)
-    there = group.room - _HEAD
-    data = record["data"] & _KEEP[length, 0]
-    missing = (there < length) & (kind & REMOTE == 0)
-    if missing.any():
-        group.damaged("a frame's object ends before its data", missing)
-        length = np.where(missing, there, length).astype(np.uint8)
-        data &= _KEEP[length, 0]
-    data[kind & REMOTE != 0] = 0
-    return Found(record["channel"], record["id"] & _KEY, kind, length, data)
+    remote = kind & REMOTE != 0
+    length = _there(_short(record["dlc"], group), group.room - _HEAD, remote, group)
+    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[length * ~remote, 0])
+
+
+def _there(length: NDArray[np.uint8], there: NDArray[np.int64], remote: Any, group: Group) -> NDArray[np.uint8]:
+    """Bytes of data of each frame that its object really holds; of a remote frame, those it asks for."""
+    missing = (there < length) & ~remote
+    if not missing.any():
+        return length
+    group.damaged("a frame's object ends before its data", missing)
+    return np.where(missing, there, length).astype(np.uint8)
 
 
 def _short(dlc: NDArray[np.uint8], group: Group) -> NDArray[np.uint8]:
@@ -123,38 +125,38 @@ def _fd(group: Group) -> Found:
     record = group.record
     group.odd(REQUESTS, _count(record["flags"] & _DIRECTION == _REQUEST))
     kind = _FLAGS[record["flags"]] | _FD_FLAGS[record["fd"]]
-    there = group.room - (_FD.itemsize - LONG)
-    return _flexible(group, kind, there)
+    remote = kind & REMOTE != 0
+    length = _there(_valid(group, kind, remote), group.room - (_FD.itemsize - LONG), remote, group)
+    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[length * ~remote])
 
 
 def _fd64(group: Group) -> Found:
+    """The bytes of data that an object states and does not hold are zero: CANoe and Vector's library read it so
+    (python-can's issue 1905), since some loggers leave them out."""
     record = group.record
     group.odd(REQUESTS, _count(record["direction"] == _REQUEST))
-    kind = _FD_FLAGS[(record["flags"] >> np.uint32(12)).astype(np.uint8)]
+    kind = _FD_FLAGS[(record["flags"] >> np.uint32(12) & np.uint32(7))]
     kind[record["flags"] & 0x10 != 0] |= REMOTE
     kind[record["direction"] != 0] |= SENT
+    remote = kind & REMOTE != 0
+    length = _valid(group, kind, remote)
     more = record["more"].astype(np.int64)
     there = np.where(more > 0, np.minimum(more - group.header, group.room), group.room) - (_FD64.itemsize - LONG)
-    return _flexible(group, kind, there)
+    group.odd(ZERO_FILLED, _count(~remote & (there < length)))
+    kept = np.clip(there, 0, length) * ~remote
+    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[kept])
 
 
-def _flexible(group: Group, kind: NDArray[np.uint8], there: NDArray[np.int64]) -> Found:
-    """Frames whose objects state their valid bytes, of which only some may be `there`.
-
-    The rest is zero: CANoe and Vector's library read such objects so (python-can's issue 1905).
-    """
-    record, valid, dlc = group.record, group.record["valid"], group.record["dlc"]
-    remote, flexible = kind & REMOTE != 0, kind & FD != 0
+def _valid(group: Group, kind: NDArray[np.uint8], remote: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Bytes of frames whose objects state those that are valid; of remote frames, those of their length code."""
+    valid, dlc, flexible = group.record["valid"], group.record["dlc"], kind & FD != 0
     coded = _LENGTHS[np.minimum(dlc, np.uint8(15))]
     length = np.where(remote, coded, valid)
     if (length > LONG).any():
         group.damaged("an FD frame states more than 64 bytes", length > LONG)
-    length = np.minimum(length, np.where(flexible, np.uint8(LONG), np.uint8(SHORT)))
     group.odd(LONG_CODES, _count(~flexible & (dlc > SHORT)))
     group.odd(OTHER_LENGTH, _count(flexible & ~remote & (valid != coded)))
-    group.odd(ZERO_FILLED, _count(~remote & (there < length)))
-    kept = np.where(remote, 0, np.clip(there, 0, length))
-    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[kept])
+    return np.minimum(length, np.where(flexible, np.uint8(LONG), np.uint8(SHORT)))
 
 
 def _no_data(kind: int) -> Callable[[Group], Found]:

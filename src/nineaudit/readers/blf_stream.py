@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from nineaudit.readers.blf_chain import ROOM, Bytes, Places, Records, follow
-from nineaudit.readers.blf_containers import Piece
+from nineaudit.readers.blf_inflate import Piece
 from nineaudit.readers.losses import Losses
 
 _ZEROS: Final = bytes(ROOM)
@@ -94,7 +94,7 @@ class Stream:
         batch = Batch(buffer, chain.at, chain.heads, begins, files)
         lost = self._book_gaps(batch, chain.gaps, before.lost)
         if chain.cut:
-            what = "the last object is not whole"
+            what = "an object is cut off"
             self.losses.add(what, batch.place(chain.tail), lost=ends[-1] - chain.tail)
         self.rest = self._after(batch, buffer[chain.tail : ends[-1]].tobytes(), chain.tail, chain.synced)
         self.rest.lost = lost and not len(chain.at)
