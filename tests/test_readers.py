@@ -500,12 +500,12 @@ def test_mf4_without_asammdf_says_what_to_install(tmp_path: Path, monkeypatch: p
         read_can(path)
 
 
-@pytest.mark.parametrize("part", [0.2, 0.6, 0.95])
+@pytest.mark.parametrize("part", [0.2, 0.6])
 def test_a_cut_mcap(tmp_path: Path, part: float) -> None:
     path = write_any(MOTION, tmp_path, ".mcap")
     data = path.read_bytes()
     path.write_bytes(data[: int(part * len(data))])
-    with pytest.raises(RecordingError, match=r"cut short or damaged.* (no messages|\d+ messages .*) could be read"):
+    with pytest.raises(RecordingError, match=r"cut short or damaged.* no messages could be read"):
         read(path, RIG)
 
 
@@ -526,7 +526,7 @@ def test_a_flipped_byte_in_an_mcap_chunk(tmp_path: Path) -> None:
     whole = path.read_bytes()
     assert whole.count(b'"p": 3.5') == 1
     path.write_bytes(whole.replace(b'"p": 3.5', b'"p": 7.5'))
-    with pytest.raises(RecordingError, match="crc validation failed in Chunk"):
+    with pytest.raises(RecordingError, match=r"a chunk whose checksum \(CRC\) does not hold; 20 messages lost"):
         read(path, small_rig(""))
 
 
@@ -617,7 +617,9 @@ def test_an_encoding_that_is_not_read(tmp_path: Path) -> None:
         channel = writer.register_channel("/imu", "protobuf", 0)
         writer.add_message(channel, log_time=0, publish_time=0, data=b"\x08\x01")
         writer.finish()
-    with pytest.raises(RecordingError, match=r"topic /imu: messages in an encoding.*protobuf.*expected JSON or ROS 2"):
+    with pytest.raises(
+        RecordingError, match=r"topic /imu: messages in an encoding.*protobuf.*expected JSON, protobuf, ROS 2"
+    ):
         read(path, with_signals(small_rig(""), "/imu:p", "/imu:q"))
 
 

@@ -1,211 +1,195 @@
-"""MCAP logs with JSON or ROS 2 messages. A signal is /topic:field.path, or a field's name where it is unique.
+"""MCAP logs with JSON, protobuf, ROS 1 or ROS 2 messages. A signal is /topic:field.path, or a field's name where it is
+unique.
 
-Time is the log time of a message, unless the rig names a time signal that the topic's messages carry. Chunk and
-data checksums are verified.
+Time is the log time of a message, unless the rig names a time signal that the topic's messages carry. What of a file
+cannot be read is reported, what is good is kept (docs/readers.md).
 """
 
 from __future__ import annotations
 
-import json
-import struct
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import mmap
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from nineaudit.array import FloatArray, frozen
 from nineaudit.errors import RecordingError
-from nineaudit.readers.contents import Contents, cut_short, span
-from nineaudit.readers.fields import MISSING, leaves, lookup
+from nineaudit.readers.contents import Contents
+from nineaudit.readers.mcap_book import Book
+from nineaudit.readers.mcap_parse import MAGIC, Int64
+from nineaudit.readers.mcap_records import batches
+from nineaudit.readers.mcap_topics import Stream, Topics, unreadable
 from nineaudit.recording import Trace
-from nineaudit.signals import MCAP_ORIGIN, suggestion, time_unit
+from nineaudit.signals import suggestion, time_unit
 from nineaudit.units import factor
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
 
-_EPOCH_NS = 10**15  # 1e6 s: larger log times are dates, and lose digits as floating-point seconds
-
-
-@dataclass
-class _Log:
-    """Messages as they come out of the file: per topic (log times in ns, raw data), and how to decode them."""
-
-    times: dict[str, list[int]] = field(default_factory=dict)
-    data: dict[str, list[bytes]] = field(default_factory=dict)
-    channels: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    messages: int = 0
-    origin: int = 0
-
-    def said(self) -> str:
-        stamps = [t for topic in self.times.values() for t in (min(topic), max(topic))]
-        return span(self.messages, "message", min(stamps, default=0) * 1e-9, max(stamps, default=0) * 1e-9)
+_EPOCH_NS: Final = 10**15
+"""1e6 s: larger times are dates, and lose digits as floating-point seconds."""
+_NS: Final = {"s": 10**9, "ms": 10**6, "us": 10**3, "µs": 10**3, "ns": 1}
 
 
 def read_mcap(path: Path, rig: Rig) -> Contents:
-    """Signals of an MCAP log, each topic on its own clock.
+    """Signals of an MCAP log, each topic on its own clock, and what of the file could not be read.
 
-    Values that are absent, null or no numbers are NaN and counted. Raises RecordingError: truncated, a checksum
-    that does not hold, a missing topic or field, an encoding that is neither JSON nor ROS 2.
+    Values that are absent, null or no numbers are NaN and counted. Raises RecordingError: not an MCAP file, no message
+    that can be read, a missing topic or field, an encoding that is not read.
     """
-    log = _messages(path)
-    decoded = _Decoded(log, path)
-    places = [_place(sensor.signal, sensor.channel, decoded, path) for sensor in rig.array.sensors]
-    used = list(dict.fromkeys(topic for topic, _ in places))
-    base = min(min(log.times[topic]) for topic in used)
-    base = base if base > _EPOCH_NS else 0
-    clocks = {topic: _clock(topic, rig, decoded, base) for topic in used}
-    traces = []
-    missing = 0
-    for sensor, (topic, name) in zip(rig.array.sensors, places, strict=True):
-        values = np.array([_number(lookup(message, name)) for message in decoded.all(topic)])
-        missing += int(np.count_nonzero(np.isnan(values)))
-        traces.append(Trace(sensor.channel, f"{topic}:{name}", clocks[topic], frozen(values)))
-    counts = {
-        "messages": log.messages,
-        "topics": len(log.channels),
-        "messages_used": sum(len(log.times[topic]) for topic in used),
-        "undecodable_messages": decoded.undecodable,
-        "invalid_values": missing,
-    }
-    notes = (f"time counts from log time {base} ns",) if base else ()
-    return Contents(tuple(traces), counts, notes)
+    book = Book()
+    topics = Topics(rig, path, book)
+    for batch in batches(_mapped(path), book, topics.wanted):
+        topics.take(batch)
+    if not book.count:
+        raise _nothing(path, book)
+    places = [_place(sensor.signal, sensor.channel, topics) for sensor in rig.array.sensors]
+    used = {topic: _streams(topics, topic) for topic in dict.fromkeys(topic for topic, _ in places)}
+    clocks, notes = _clocks(used, rig, book.origin)
+    traces = [
+        Trace(sensor.channel, f"{topic}:{name}", clocks[topic], frozen(_values(used[topic], name)))
+        for sensor, (topic, name) in zip(rig.array.sensors, places, strict=True)
+    ]
+    counts = _counts(book, topics, used) | {"invalid_values": sum(int(np.isnan(t.values).sum()) for t in traces)}
+    return Contents(tuple(traces), counts, (*notes, *_notes(book, used)), book.damages.all())
 
 
-def _messages(path: Path) -> _Log:
-    """All messages. The whole file is read, so that damage anywhere is found; what came before it is said."""
-    import zstandard
-    from mcap.exceptions import McapError
-    from mcap.records import Channel, Message, Metadata, Schema, Statistics
-    from mcap.stream_reader import CRCValidationError, StreamReader
-
-    log, schemas, channels, stated = _Log(), dict[int, Any](), dict[int, Any](), None
+def _mapped(path: Path) -> memoryview:
+    """A file's bytes, read as they are needed. Raises RecordingError where it is no MCAP file."""
     with path.open("rb") as file:
-        try:
-            for record in StreamReader(_Whole(file), validate_crcs=True).records:  # type: ignore[arg-type]
-                if isinstance(record, Schema):
-                    schemas[record.id] = record
-                elif isinstance(record, Channel):
-                    channels[record.id] = record
-                elif isinstance(record, Metadata) and MCAP_ORIGIN in record.metadata:
-                    log.origin = int(record.metadata[MCAP_ORIGIN])
-                elif isinstance(record, Statistics):
-                    stated = record.message_count
-                elif isinstance(record, Message):
-                    channel = channels[record.channel_id]
-                    log.channels[channel.topic] = (schemas.get(channel.schema_id), channel)
-                    log.times.setdefault(channel.topic, []).append(record.log_time)
-                    log.data.setdefault(channel.topic, []).append(record.data)
-                    log.messages += 1
-        except (CRCValidationError, McapError, struct.error, zstandard.ZstdError) as error:
-            raise cut_short(path, _reason(error), log.said(), place=f"byte {file.tell()}") from error
-        except (RuntimeError, KeyError, ValueError, EOFError) as error:  # LZ4 and records of damaged length
-            raise cut_short(path, _reason(error), log.said(), place=f"byte {file.tell()}") from error
-    if stated is not None and stated != log.messages:
-        raise cut_short(path, f"its statistics count {stated} messages", log.said())
-    return log
+        if file.read(len(MAGIC)) != MAGIC:
+            raise RecordingError("not an MCAP file", file=path, place="byte 0", expected="the magic bytes \\x89MCAP0")
+        return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
 
 
-class _Whole:
-    """A file that does not answer with less than it was asked for, as the MCAP reader takes for granted."""
-
-    def __init__(self, file: Any) -> None:
-        self.file = file
-
-    def read(self, size: int) -> bytes:
-        data: bytes = self.file.read(size)
-        if len(data) < size:
-            raise EOFError(f"it ends {size - len(data)} bytes too early")
-        return data
+def _nothing(path: Path, book: Book) -> RecordingError:
+    damage = "; ".join(str(d) for d in book.damages.all()[:3])
+    return RecordingError(
+        f"the file is cut short or damaged: {damage}" if damage else "there are no messages in this file",
+        file=path,
+        advice="no messages could be read; record or copy the file again" if damage else None,
+    )
 
 
-class _Decoded:
-    """Messages of a topic as dictionaries or ROS messages, each topic decoded once, when it is asked for."""
-
-    def __init__(self, log: _Log, path: Path) -> None:
-        self.log, self.path, self.undecodable = log, path, 0
-        self._done: dict[str, list[Any]] = {}
-
-    def first(self, topic: str) -> Any:
-        return next((m for m in self.all(topic) if m is not None), None)
-
-    def all(self, topic: str) -> list[Any]:
-        if topic not in self._done:
-            decode = self._decoder(topic)
-            self._done[topic] = [self._try(decode, data) for data in self.log.data[topic]]
-        return self._done[topic]
-
-    def _try(self, decode: Callable[[bytes], Any], data: bytes) -> Any:
-        try:
-            return decode(data)
-        except (ValueError, struct.error, IndexError):
-            self.undecodable += 1
-            return None
-
-    def _decoder(self, topic: str) -> Callable[[bytes], Any]:
-        schema, channel = self.log.channels[topic]
-        if channel.message_encoding == "json":
-            return json.loads
-        if channel.message_encoding == "cdr" and schema is not None:
-            from mcap_ros2.decoder import DecoderFactory
-
-            found = DecoderFactory().decoder_for(channel.message_encoding, schema)
-            if found is not None:
-                return found
-        raise RecordingError(
-            "messages in an encoding that is not read",
-            file=self.path,
-            place=f"topic {topic}",
-            found=f"{channel.message_encoding}, schema {schema.encoding if schema else 'none'}",
-            expected="JSON or ROS 2 (cdr, ros2msg)",
-        )
+def _streams(topics: Topics, topic: str) -> list[Stream]:
+    return [s for s in topics.streams.values() if s is not None and s.topic == topic and s.times]
 
 
-def _place(signal: str, channel: str, decoded: _Decoded, path: Path) -> tuple[str, str]:
+def _place(signal: str, channel: str, topics: Topics) -> tuple[str, str]:
     """(topic, field) of a signal."""
-    topics = list(decoded.log.channels)
     topic, colon, name = signal.partition(":")
-    what = f"missing channel {channel!r}"
     if not colon:
-        hits = [t for t in _readable(decoded) if lookup(decoded.first(t), signal) is not MISSING]
-        if len(hits) == 1:
-            return hits[0], signal
-        names = [f"{t}:{name}" for t in (hits or _readable(decoded)) for name in leaves(decoded.first(t))]
-        advice = f"in more than one topic: {', '.join(hits)}" if hits else suggestion(signal, names)
-        raise RecordingError(what, file=path, expected=f"/topic:{signal} for signal {signal!r}", advice=advice)
-    if topic not in topics:
-        raise RecordingError(what, file=path, expected=f"a topic {topic!r}", advice=suggestion(topic, topics))
-    if all(lookup(m, name) is MISSING for m in decoded.all(topic)):
-        raise RecordingError(
-            what,
-            file=path,
-            place=f"topic {topic}",
-            expected=f"a field {name!r}",
-            advice=suggestion(name, leaves(decoded.first(topic))),
-        )
+        return _owner(signal, channel, topics), signal
+    streams = _streams(topics, topic)
+    if not streams:
+        raise _no_topic(topic, channel, topics)
+    if not any(name in s.known or s.column(name).there.any() for s in streams):
+        leaves = [leaf for s in streams for leaf in s.leaves]
+        raise _missing(channel, topics, f"a field {name!r}", suggestion(name, leaves), f"topic {topic}")
     return topic, name
 
 
-def _readable(decoded: _Decoded) -> list[str]:
-    return [t for t, (_, channel) in decoded.log.channels.items() if channel.message_encoding in ("json", "cdr")]
+def _owner(signal: str, channel: str, topics: Topics) -> str:
+    """The one topic that has a field."""
+    streams = [s for s in topics.streams.values() if s is not None]
+    hits = list(dict.fromkeys(s.topic for s in streams if signal in s.known))
+    if len(hits) == 1:
+        return hits[0]
+    names = [f"{s.topic}:{leaf}" for s in streams for leaf in s.leaves]
+    advice = f"in more than one topic: {', '.join(hits)}" if hits else suggestion(signal, names)
+    raise _missing(channel, topics, f"/topic:{signal} for signal {signal!r}", advice)
 
 
-def _clock(topic: str, rig: Rig, decoded: _Decoded, base: int) -> FloatArray:
-    """(m,) s of a topic's messages: the rig's time signal where they carry it, else log time less `base` ns."""
-    owner, colon, name = (rig.time_signal or "").rpartition(":")
-    if name and (not colon or owner == topic) and lookup(decoded.first(topic), name) is not MISSING:
-        values = np.array([_number(lookup(m, name)) for m in decoded.all(topic)])
-        return frozen(values * factor(time_unit(name, rig.time_unit) or "s", "time"))
-    return frozen([(t - base + decoded.log.origin) * 1e-9 for t in decoded.log.times[topic]])
+def _no_topic(topic: str, channel: str, topics: Topics) -> RecordingError:
+    if topic in topics.refused:
+        return unreadable(topics.path, topic, topics.refused[topic])
+    there = [c.topic for number, c in topics.book.channels.items() if topics.book.messages.get(number)]
+    return _missing(channel, topics, f"a topic {topic!r}", suggestion(topic, there))
 
 
-def _number(value: Any) -> float:
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value):
-        return float(value)
-    return float("nan")
+def _missing(
+    channel: str, topics: Topics, expected: str, advice: str | None, place: str | None = None
+) -> RecordingError:
+    damage = [f"the file is damaged: {d}" for d in topics.book.damages.all()[:1]]
+    said = "; ".join([*([advice] if advice else []), *damage])
+    what = f"missing channel {channel!r}"
+    return RecordingError(what, file=topics.path, place=place, expected=expected, advice=said or None)
 
 
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split())[:120] or type(error).__name__
+def _in_order(streams: Sequence[Stream], columns: Sequence[Any]) -> Any:
+    """Columns of the channels of a topic as one, in the order of the file."""
+    if len(columns) == 1:
+        return columns[0]
+    return np.concatenate(columns)[np.argsort(np.concatenate([o for s in streams for o in s.order]))]
+
+
+def _values(streams: Sequence[Stream], name: str) -> FloatArray:
+    found: FloatArray = _in_order(streams, [s.column(name).floats() for s in streams])
+    return found
+
+
+def _clocks(used: dict[str, list[Stream]], rig: Rig, origin: int) -> tuple[dict[str, FloatArray], tuple[str, ...]]:
+    """(m,) s of each topic's messages. Dates count from the earliest of them, which the note says."""
+    stamps = {topic: _in_order(streams, [_stamps(s, rig, origin) for s in streams]) for topic, streams in used.items()}
+    dates = {topic: _first(stamp) for topic, stamp in stamps.items() if _first(stamp) > _EPOCH_NS}
+    base = int(min(dates.values(), default=0))
+    clocks = {topic: frozen(_seconds(stamp, base if topic in dates else 0)) for topic, stamp in stamps.items()}
+    return clocks, (f"time counts from log time {base} ns",) if base else ()
+
+
+def _stamps(stream: Stream, rig: Rig, origin: int) -> Int64 | FloatArray:
+    """(m,) times of a channel's messages: int64 ns, or float64 s where its time signal is no integer."""
+    if not stream.stamp:
+        return np.concatenate(stream.times) + origin
+    columns = [stream.column(name) for name in stream.stamp]
+    there = np.logical_and.reduce([c.there for c in columns])
+    whole = all(c.values.dtype.kind in "iu" for c in columns)
+    unit = time_unit(stream.stamp[0], rig.time_unit) or "s"
+    if len(columns) == 2 and whole:
+        return _or_none(columns[0].values.astype(np.int64) * 10**9 + columns[1].values.astype(np.int64), there)
+    if whole and unit in _NS and not (np.abs(columns[0].floats()) * _NS[unit] > 2**62).any():
+        return _or_none(columns[0].values.astype(np.int64) * _NS[unit], there)
+    seconds = [c.floats() * scale for c, scale in zip(columns, (factor(unit, "time"), 1e-9), strict=False)]
+    return np.asarray(np.sum(seconds, axis=0))
+
+
+def _or_none(stamps: Int64, there: Any) -> Int64 | FloatArray:
+    """Times in ns; where some messages have none, in s with NaN there."""
+    if there.all():
+        return stamps
+    return np.where(there, stamps * 1e-9, np.nan)
+
+
+def _first(stamps: Any) -> float:
+    """The earliest time in ns."""
+    if stamps.dtype.kind == "i":
+        return int(stamps.min(initial=2**62))
+    return float(np.nanmin(stamps)) * 1e9 if np.isfinite(stamps).any() else 0.0
+
+
+def _seconds(stamps: Any, base: int) -> FloatArray:
+    if stamps.dtype.kind == "i":
+        return np.asarray((stamps - base) * 1e-9)
+    return np.asarray(stamps - base * 1e-9)
+
+
+def _counts(book: Book, topics: Topics, used: dict[str, list[Stream]]) -> dict[str, float]:
+    with_messages = {book.channels[k].topic for k, n in book.messages.items() if n and k in book.channels}
+    return {
+        "messages": book.count,
+        "topics": len(with_messages),
+        "messages_used": sum(len(t) for streams in used.values() for s in streams for t in s.times),
+        "undecodable_messages": topics.undecodable,
+        "chunks": book.chunks,
+        "attachments": book.attachments,
+        "unknown_records": book.unknown,
+    }
+
+
+def _notes(book: Book, used: dict[str, list[Stream]]) -> list[str]:
+    notes = [f"topic {topic} comes on {len(s)} channels" for topic, s in used.items() if len(s) > 1]
+    if book.unchecked:
+        notes.append(f"{book.unchecked} of {book.chunks} chunks carry no checksum (CRC)")
+    return notes
