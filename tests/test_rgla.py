@@ -143,3 +143,12 @@ def test_errors_name_what_is_missing():
         rgla.sine_series(np.arange(10.0) ** 2, np.arange(10.0), 99)
     with pytest.raises(EstimationError, match="gaps"):
         rgla.direction_cosines(np.full((3, 3), np.nan), np.arange(3.0))
+
+
+def test_what_the_printed_recursion_does_is_said_in_numbers() -> None:
+    """METHODS 7.6: 30 rad/s, 150 steps of 1 ms: rows 1.069798 long; a vector across the axis that much too long."""
+    time = np.arange(151) * 1e-3
+    omega, a0 = np.tile([0.0, 0.0, 30.0], (151, 1)), np.tile([9.0, 0.0, 0.0], (151, 1))
+    said = rgla.as_printed(omega, a0, time)
+    assert "rows 1.0698 long" in said
+    assert "resultants off by 0.07" in said

@@ -151,6 +151,18 @@ def _with_rates(scheme: Callable[[SensorArray, FloatArray, FloatArray, FloatArra
     return solve
 
 
+def _rgla(derivative: rgla.Derivative) -> Method:
+    """Hu's scheme; attitude comes from the orthonormal recursion, and what the printed one would do is said."""
+    scheme = _with_rates(partial(rgla.motion, derivative=derivative))
+
+    def solve(case: Case, start: Start) -> Motion:
+        found = scheme(case, start)
+        said = f"direction cosines orthonormal; as printed: {rgla.as_printed(found.omega, found.a0, case.time)}"
+        return Motion(found.omega, found.alpha, found.a0, f"{found.method}; {said}")
+
+    return solve
+
+
 def _beginning(case: Case, start: Start) -> tuple[FloatArray, int | None]:
     """ω(0), and the sample at which ω is to be 0 where that is what is known.
 
@@ -183,15 +195,9 @@ METHODS: Final[Mapping[str, tuple[Method, str]]] = {
     "periphery": (_with_rates(martin.periphery), "triaxes on three axes and rate sensors [Martin98 eqs 8-13]"),
     "co-planar": (_with_rates(martin.coplanar), "triaxes at the origin and on two axes, rate sensors [Martin98]"),
     "compact-cube": (_with_rates(martin.compact_cube), "one triax and rate sensors, α by differences [Martin98]"),
-    "rgla": (_with_rates(rgla.motion), "accelerometers at the origin and rate sensors, five-point derivative [Hu77]"),
-    "rgla-fourier": (
-        _with_rates(partial(rgla.motion, derivative="fourier")),
-        "the same, derivative of a truncated Fourier series",
-    ),
-    "rgla-lanczos": (
-        _with_rates(partial(rgla.motion, derivative="lanczos")),
-        "the same, derivative of a Fourier series with Lanczos factors",
-    ),
+    "rgla": (_rgla("five-point"), "accelerometers at the origin and rate sensors, five-point derivative [Hu77]"),
+    "rgla-fourier": (_rgla("fourier"), "the same, derivative of a truncated Fourier series"),
+    "rgla-lanczos": (_rgla("lanczos"), "the same, derivative of a Fourier series with Lanczos factors"),
 }
 """Name -> function and what it does."""
 

@@ -167,6 +167,15 @@ def resultant_difference(body: FloatArray, laboratory: FloatArray) -> float:
     return float(np.abs(second - first).max() / first.max())
 
 
+def as_printed(omega: FloatArray, a0: FloatArray, time: FloatArray) -> str:
+    """What the printed recursion would have made of a record, in words: lengths of rows, CCᵀ − I, resultants of a0."""
+    turned = direction_cosines(omega, time)
+    left = departure(turned[-1])
+    told = np.einsum("nij,nj->ni", turned, a0)
+    lengths = f"rows {1.0 + left.norm:.6g} long, |CCᵀ − I| {left.product:.2g}"
+    return f"{lengths} at the end, resultants off by {resultant_difference(a0, told):.2g}"
+
+
 class Bandwidth(NamedTuple):
     """`harmonics` that carry HARMONIC_PART of the mean square of the record, the `frequency` of the last, Hz, the
     `rate` of the recording and what is `required`, Hz, and whether it `suffices`."""
