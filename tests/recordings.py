@@ -19,7 +19,7 @@ SENSORS = {
     "wx": ("gyroscope", (0, 0, 0), (1, 0, 0), "NAAP_B.WX"),
 }
 CAN_FORMATS = (".blf", ".asc", ".log", ".trc", ".can.csv", ".mf4")
-TABLE_FORMATS = (".csv", ".tsv", ".txt", ".parquet", ".mcap")
+TABLE_FORMATS = (".csv", ".tsv", ".txt", ".parquet", ".mcap", ".mme", ".zip")
 
 
 def rig_text(extra: str = "", recording: str = 'time = "time_s"') -> str:

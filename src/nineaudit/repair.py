@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
@@ -17,6 +16,7 @@ from nineaudit.array import FloatArray
 from nineaudit.auditing import Audit, mend
 from nineaudit.diagnose import Status
 from nineaudit.errors import ConfigurationError, RecordingError
+from nineaudit.readers import fingerprint
 from nineaudit.reconstruct import Reconstruction
 from nineaudit.writers import write_recording
 
@@ -50,7 +50,7 @@ def repair(
     rebuilt = _reconstruction(audit, channel)
     write_recording(audit.recording, output, dbc=dbc, readings=repaired_readings(audit, rebuilt), force=force)
     original = audit.recording.source
-    if original.path.is_file() and _sha256(original.path) != original.sha256:
+    if original.path.exists() and fingerprint(original.path)[1] != original.sha256:
         output.unlink()
         raise RecordingError(
             "the original has changed since it was read, and the repair was taken back",
@@ -83,7 +83,7 @@ def provenance(
     return {
         "schema": SCHEMA,
         "original": {"path": source.path.name, "sha256": source.sha256, "bytes": source.size, "altered": False},
-        "output": {"path": output.name, "sha256": _sha256(output)},
+        "output": {"path": output.name, "sha256": fingerprint(output)[1]},
         "rig": {"name": rig.name, "sha256": rig.sha256},
         "rulebook": {"sha256": audit.rulebook.sha256},
         "channels": list(rebuilt.channels),
@@ -138,11 +138,6 @@ def _reconstruction(audit: Audit, channel: str | None) -> Reconstruction:
         file=audit.recording.source.path,
         advice="" if status is Status.HEALTHY else "if you know the channel from elsewhere, name it with --channel",
     )
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _write_atomically(path: Path, text: str) -> None:

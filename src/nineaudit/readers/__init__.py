@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from nineaudit.errors import RecordingError
+from nineaudit.readers import mme_files
 from nineaudit.readers.assemble import assemble
 from nineaudit.readers.can_log import read_can
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.csv_table import read_text_table
 from nineaudit.readers.mcap_log import read_mcap
+from nineaudit.readers.mme import read_mme
 from nineaudit.readers.parquet_table import read_parquet
 from nineaudit.recording import Recording, Source
 from nineaudit.signals import suggestion
@@ -25,7 +27,7 @@ from nineaudit.signals import suggestion
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
 
-__all__ = ["READERS", "Contents", "Reader", "assemble", "read"]
+__all__ = ["READERS", "Contents", "Reader", "assemble", "fingerprint", "read"]
 
 Reader = Callable[[Path, "Rig"], Contents]
 
@@ -36,14 +38,14 @@ _MAGIC: Final = {
     b"MDF     ": (".mf4", "an MDF file"),
     b"UnFinMF ": (".mf4", "an MDF file"),
     b"PAR1": (".parquet", "a Parquet table"),
-    b"PK\x03\x04": ("", "a ZIP archive (or a spreadsheet)"),
+    b"PK\x03\x04": (".zip", "a ZIP archive (or a spreadsheet)"),
     b"\x1f\x8b": ("", "a gzip archive"),
     b"%PDF": ("", "a PDF document"),
     b"\x89PNG": ("", "a PNG picture"),
     b"\x89HDF": ("", "an HDF5 file"),
     b"SQLite format 3": ("", "an SQLite database"),
 }
-_BINARY: Final = (".blf", ".mcap", ".mf4", ".parquet")
+_BINARY: Final = (".blf", ".mcap", ".mf4", ".parquet", ".zip")
 
 
 def _read_csv(path: Path, rig: Rig) -> Contents:
@@ -64,6 +66,8 @@ READERS: Final[Mapping[str, Reader]] = {
     ".trc": read_can,
     ".mf4": read_can,
     ".mcap": read_mcap,
+    ".mme": read_mme,
+    ".zip": read_mme,
 }
 """Reader of each suffix (lower case)."""
 
@@ -78,15 +82,15 @@ def read(path: str | Path, rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recor
     rig = replace(rig, dbc=tuple(Path(p) for p in dbc)) if dbc else rig
     reader = _reader(path)
     try:
-        size, sha256 = path.stat().st_size, _sha256(path)
+        size, sha256 = fingerprint(path)
         _require_kind(path, size)
         contents = reader(path, rig)
-        unchanged = _sha256(path) == sha256
+        unchanged = fingerprint(path)[1] == sha256
     except OSError as error:
         raise RecordingError(f"cannot be read: {error.strerror or error}", file=path) from error
     source = Source(
         path=path,
-        format=path.suffix.lower().removeprefix("."),
+        format="mme" if reader is read_mme else path.suffix.lower().removeprefix("."),
         sha256=sha256,
         size=size,
         unchanged_after_read=unchanged,
@@ -99,6 +103,8 @@ def read(path: str | Path, rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recor
 
 def _reader(path: Path) -> Reader:
     if path.is_dir():
+        if mme_files.is_test(path):
+            return read_mme
         raise RecordingError("is a folder, not a recording", file=path, advice="name the files in it")
     suffix = path.suffix.lower()
     if suffix not in READERS:
@@ -112,9 +118,12 @@ def _reader(path: Path) -> Reader:
     return READERS[suffix]
 
 
-def _sha256(path: Path) -> str:
+def fingerprint(path: Path) -> tuple[int, str]:
+    """(bytes, SHA-256) of a recording: of its file, or of the files of an ISO-MME test."""
+    if mme_files.is_test(path):
+        return mme_files.fingerprint(path)
     with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        return path.stat().st_size, hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _require_kind(path: Path, size: int) -> None:
@@ -122,6 +131,8 @@ def _require_kind(path: Path, size: int) -> None:
     if size == 0:
         raise RecordingError("the file is empty", file=path)
     suffix = path.suffix.lower()
+    if mme_files.is_test(path):
+        return
     with path.open("rb") as file:
         head = file.read(16)
     found = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
@@ -133,5 +144,12 @@ def _require_kind(path: Path, size: int) -> None:
         place="byte 0",
         found=found[1] if found else head[:8],
         expected=next((kind for end, kind in _MAGIC.values() if end == suffix), "text"),
-        advice=f"rename it to {found[0]}" if found and found[0] else None,
+        advice=_advice(found) if found else None,
     )
+
+
+def _advice(found: tuple[str, str]) -> str | None:
+    suffix, kind = found
+    if kind == "a gzip archive":
+        return "unpack it and read what is in it"
+    return f"rename it to {suffix}" if suffix not in ("", ".zip") else None

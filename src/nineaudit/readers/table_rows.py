@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import Final
 
@@ -51,12 +51,12 @@ class Rows:
         if not block.endswith(b"\n"):
             self.unfinished = self.line + block.count(b"\n")
             block += b"\n"
-        cells = _cells_a_row(block, self.table)
-        values = self._by_arrow(block, cells) if self._fits(block, cells) else None
+        cells, rows = _structure(block, self.table)
+        values = self._by_arrow(block, cells) if self._fits(block, cells, rows) else None
         if values is None:
-            values = self._by_cell(block)
+            values, rows = self._by_cell(block), block.count(b"\n")
         self.parts.append(values)
-        self.line += block.count(b"\n")
+        self.line += rows
 
     def column(self, index: int) -> FloatArray:
         """(n,) numbers of wanted column number `index`; to be asked for once, its parts are let go."""
@@ -83,18 +83,20 @@ class Rows:
         if self.unfinished:
             yield Damage("the last line has no line end: the file may be cut", f"line {self.unfinished}")
 
-    def _fits(self, block: bytes, cells: int) -> bool:
+    def _fits(self, block: bytes, cells: int, rows: int) -> bool:
         """Whether rows of so many cells are as the header has them, or with one more that is empty."""
         surplus = cells - len(self.table.names)
         ends = self.table.separator.encode()
-        if surplus == 1 and block.count(ends + b"\n") + block.count(ends + b"\r\n") == block.count(b"\n"):
+        if surplus == 1 and block.count(ends + b"\n") + block.count(ends + b"\r\n") == rows:
             self.trailing = self.trailing or not self.table.trailing
             return True
         return surplus == 0
 
     def _by_arrow(self, block: bytes, cells: int) -> list[FloatArray] | None:
-        """The columns of a block of equal rows, None where a cell is neither a number nor empty."""
+        """The columns of a block of equal rows, None where cells hold what Arrow does not read."""
         values = _parsed(block, self.table, self.wanted, cells)
+        if values is None:
+            values = _parsed(self._without_words(block), self.table, self.wanted, cells)
         if values is None:
             return None
         lines: list[bytes] = []
@@ -108,6 +110,25 @@ class Rows:
                 row = int(gaps[0])
                 self._first(column, self.line + row, self._cells(lines[row])[column])
         return values
+
+    def _without_words(self, block: bytes) -> bytes:
+        """The block with nothing in the cells that hold no number, and in those that are not wanted, of the lines that
+        hold anything but numbers."""
+        separator = self.table.separator
+        numeric = b"0123456789+-eE \t\r" + (separator + self.table.decimal).encode()
+        lines = block.split(b"\n")
+        for i, line in enumerate(lines):
+            if line.translate(None, numeric):
+                cells = self._cells(line)
+                kept = {column: self._numeric(cells[column], column, self.line + i) for column in self.wanted}
+                lines[i] = separator.join(kept.get(column, "") for column in range(len(cells))).encode()
+        return b"\n".join(lines)
+
+    def _numeric(self, cell: str, column: int, line: int) -> str:
+        if not isnan(number(cell, self.table.decimal)):
+            return cell
+        self._refuse_thousands(cell, column, line)
+        return ""
 
     def _by_cell(self, block: bytes) -> list[FloatArray]:
         values: list[list[float]] = [[] for _ in self.wanted]
@@ -176,17 +197,17 @@ def number(cell: str, decimal: str) -> float:
     return value if isfinite(value) else nan
 
 
-def _cells_a_row(block: bytes, table: Dialect) -> int:
-    """Cells of every row of a block; 0 where rows differ, or hold what only `_by_cell` reads."""
+def _structure(block: bytes, table: Dialect) -> tuple[int, int]:
+    """(cells of every row, rows) of a block; cells 0 where rows differ, or hold what only `_by_cell` reads."""
     separator = table.separator.encode()
     comment = block.startswith(b"#") or b"\n#" in block
     if comment or table.decimal == table.separator or len(table.names) < 2 or len(separator) != 1:
-        return 0
+        return 0, 0
     marks = block.translate(None, _OTHERS.get(separator) or _others(separator))
     row = marks[: marks.index(b"\n") + 1]
-    cells = row.removesuffix(b"\n").removesuffix(b"\r").split(separator)
+    cells, rows = row.removesuffix(b"\n").removesuffix(b"\r").split(separator), len(marks) // len(row)
     plain = all(cell in (b"", b'""') for cell in cells)
-    return len(cells) if plain and row * block.count(b"\n") == marks else 0
+    return (len(cells) if plain and row * rows == marks else 0), rows
 
 
 def _others(separator: bytes) -> bytes:

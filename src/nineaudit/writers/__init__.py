@@ -21,6 +21,7 @@ from nineaudit.signals import suggestion
 from nineaudit.writers.can_file import write_asc, write_blf
 from nineaudit.writers.dbc import make_dbc
 from nineaudit.writers.mcap_file import write_mcap
+from nineaudit.writers.mme_file import write_mme, write_mme_zip
 from nineaudit.writers.outcome import Outcome
 from nineaudit.writers.table_file import write_csv, write_parquet
 
@@ -37,6 +38,8 @@ WRITERS: Final[Mapping[str, Writer]] = {
     ".mcap": write_mcap,
     ".blf": write_blf,
     ".asc": write_asc,
+    ".mme": write_mme,
+    ".zip": write_mme_zip,
 }
 """Writer of each suffix (lower case)."""
 

@@ -1,0 +1,179 @@
+"""The files of an ISO-MME test: a folder or a ZIP archive with a .mme file, and beside or below it a .chn index and one
+file a channel (.001, .002, ...). ISO/TS 13499 clause 5, RED A (directory structure).
+
+Nothing is unpacked to disk; of no member are more than `LARGEST` bytes read, whatever the archive says of its size.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import lzma
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import BinaryIO, Final
+
+from nineaudit.errors import RecordingError
+from nineaudit.readers.contents import cut_short
+from nineaudit.recording import Damage
+
+LARGEST: Final = 256 * 2**20
+"""Bytes of a channel that are read: some 16 million samples."""
+_STEP: Final = 2**20
+_CHANNEL: Final = re.compile(r"\.\d{3,}$")
+_BROKEN: Final = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+)
+"""What zipfile raises of damaged, encrypted and unusual archives."""
+
+Reader = Callable[[str, int], tuple[bytes, tuple[Damage, ...]]]
+"""(name, most bytes) -> what could be read of a file, and what could not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Store:
+    """`names` of the files of a folder or an archive, and how one is read."""
+
+    names: tuple[str, ...]
+    read: Reader
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """A test among the files of a store: names of its header, its index and its channels, in their order."""
+
+    store: Store
+    header: str | None
+    index: str | None
+    channels: tuple[str, ...]
+
+
+def open_test(path: Path) -> Test:
+    """The test in a folder, in a ZIP archive, or of a .mme file.
+
+    Raises RecordingError: the archive has no directory that can be read, no channel files, or several tests.
+    """
+    if path.is_dir():
+        return _test_in(_folder(path), path, None)
+    if path.suffix.lower() == ".mme":
+        return _test_in(_folder(path.parent), path, path.name)
+    return _test_in(_archive(path), path, None)
+
+
+def is_test(path: Path) -> bool:
+    """Whether a path is a folder with a .mme file or a folder Channel in it, or a .mme file."""
+    if not path.is_dir():
+        return path.suffix.lower() == ".mme"
+    return any(p.suffix.lower() == ".mme" or p.name.lower() == "channel" for p in path.iterdir())
+
+
+def fingerprint(path: Path) -> tuple[int, str]:
+    """(bytes, SHA-256) of the files of the test in a folder or of a .mme file: of their names and contents."""
+    test = open_test(path)
+    folder = path if path.is_dir() else path.parent
+    total, digest = 0, hashlib.sha256()
+    for name in sorted(name for name in (test.header, test.index, *test.channels) if name):
+        with (folder / name).open("rb") as file:
+            content = hashlib.file_digest(file, "sha256").hexdigest()
+            total += file.tell()
+        digest.update(f"{name}\0{content}\n".encode())
+    return total, digest.hexdigest()
+
+
+def _folder(folder: Path) -> Store:
+    """The files of a folder and of those in it that are called Channel."""
+    places = [folder, *(p for p in folder.iterdir() if p.is_dir() and p.name.lower() == "channel")]
+    names = sorted(p.relative_to(folder).as_posix() for place in places for p in place.iterdir() if p.is_file())
+
+    def read(name: str, most: int) -> tuple[bytes, tuple[Damage, ...]]:
+        with (folder / name).open("rb") as file:
+            return _bounded(file, name, most)
+
+    return Store(tuple(names), read)
+
+
+def _archive(path: Path) -> Store:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = tuple(info.filename for info in archive.infolist() if not info.is_dir())
+    except _BROKEN as error:
+        raise cut_short(path, f"its directory cannot be read ({error})", "no file") from error
+
+    def read(name: str, most: int) -> tuple[bytes, tuple[Damage, ...]]:
+        try:
+            with zipfile.ZipFile(path) as archive, archive.open(name) as file:
+                return _bounded(file, name, most)  # type: ignore[arg-type]
+        except (*_BROKEN, KeyError) as error:
+            return b"", (Damage(f"a file of the archive cannot be unpacked: {error}", name),)
+
+    return Store(names, read)
+
+
+def _bounded(file: BinaryIO, name: str, most: int) -> tuple[bytes, tuple[Damage, ...]]:
+    """Up to so many bytes of a file; what came before a fault in an archive is kept."""
+    parts: list[bytes] = []
+    size = 0
+    try:
+        while size < most and (part := file.read(min(_STEP, most - size))):
+            parts.append(part)
+            size += len(part)
+        if size >= LARGEST and file.read(1):
+            return b"".join(parts), (Damage(f"more than {LARGEST} bytes in a file", name, lost="the rest is not read"),)
+    except _BROKEN as error:
+        what = f"a file of the archive is damaged: {error}"
+        return b"".join(parts), (Damage(what, name, lost=f"{size} bytes could be unpacked"),)
+    return b"".join(parts), ()
+
+
+def _test_in(store: Store, path: Path, chosen: str | None) -> Test:
+    headers = [name for name in store.names if PurePosixPath(name).suffix.lower() == ".mme"]
+    if chosen is None and len(headers) > 1:
+        raise RecordingError(
+            "holds more than one test",
+            file=path,
+            found=", ".join(headers[:5]),
+            expected="one .mme file",
+            advice="name the .mme file of the test",
+        )
+    header = chosen or next(iter(headers), None)
+    near = [name for name in store.names if header is None or _belongs(name, header)]
+    channels = _of_stem([name for name in near if _CHANNEL.search(name)], header)
+    index = next(iter(_of_stem([name for name in near if name.lower().endswith(".chn")], header)), None)
+    if not channels:
+        raise RecordingError(
+            "no channel files of an ISO-MME test",
+            file=path,
+            found=", ".join(store.names[:5]) or "nothing",
+            expected="files .001, .002, ... beside the .mme file or in its folder Channel",
+        )
+    return Test(store, header, index, tuple(sorted(channels, key=_number)))
+
+
+def _belongs(name: str, header: str) -> bool:
+    """Whether a file is beside the header, or in the folder Channel beside it."""
+    place, home = PurePosixPath(name).parent, PurePosixPath(header).parent
+    return place == home or (place.parent == home and place.name.lower() == "channel")
+
+
+def _of_stem(names: Sequence[str], header: str | None) -> list[str]:
+    """Those that are called as the header, if there are such; else all."""
+    if header is None:
+        return list(names)
+    stem = PurePosixPath(header).stem.lower()
+    return [name for name in names if PurePosixPath(name).stem.lower() == stem] or list(names)
+
+
+def _number(name: str) -> tuple[int, str]:
+    return int(PurePosixPath(name).suffix[1:]), name
