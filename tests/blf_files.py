@@ -61,5 +61,7 @@ def log(
 ) -> bytes:
     """A file with that content behind its header."""
     whole = 144 + len(content) if size is None else size
-    head = struct.pack("<4sL8BQQLL8H8H", b"LOGG", header, 5, 0, 0, 0, 2, 6, 8, 1, whole, 0, objects, 0, *start, *NO_DATE)
+    head = struct.pack(
+        "<4sL8BQQLL8H8H", b"LOGG", header, 5, 0, 0, 0, 2, 6, 8, 1, whole, 0, objects, 0, *start, *NO_DATE
+    )
     return head.ljust(144, b"\0") + content

@@ -45,7 +45,7 @@ def read_blf(path: Path, threads: int = 1) -> Frames:
         header = read_header(file, path)
         account = Account(losses, header.start or 0)
         columns = Columns(min(header.objects, size // _LEAST_OF_A_FRAME))
-        contents = pieces(file, header, size, threads, losses)
+        contents = pieces(file, header, threads, losses)
         for batch in Stream(losses).batches(contents):
             columns.append(frames_of(batch, account))
     _check_header(header, size, account)
@@ -82,7 +82,7 @@ def _notes(header: Header, account: Account) -> Iterator[str]:
     there = sum(account.types.values())
     if header.objects < there - account.types[_RESTORE_POINT]:
         yield f"the header counts {header.objects} objects, {there} are there: the log was not closed, or appended to"
-    for what, count in account.odd.items():
+    for what, count in sorted(account.odd.items()):
         if count:
             yield f"{count} {what}"
 

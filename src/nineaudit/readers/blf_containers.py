@@ -70,9 +70,9 @@ def _start(date: list[int]) -> int | None:
     return (moment - _EPOCH) // datetime.timedelta(microseconds=1) * 1000
 
 
-def pieces(file: BinaryIO, header: Header, size: int, threads: int, losses: Losses) -> Iterator[list[Piece]]:
-    """Contents of a BLF file of `size` bytes in its order, about WINDOW bytes at once."""
-    jobs = (job for window in _windows(file, _begin(header, size, losses), losses) for job in _jobs(window))
+def pieces(file: BinaryIO, header: Header, threads: int, losses: Losses) -> Iterator[list[Piece]]:
+    """Contents of a BLF file in its order, about WINDOW bytes at once."""
+    jobs = (job for window in _windows(file, _begin(file, header, losses)) for job in _jobs(window))
     if threads < 2:
         yield from (opened(*job) for job in jobs)
         return
@@ -86,15 +86,22 @@ def pieces(file: BinaryIO, header: Header, size: int, threads: int, losses: Loss
             yield waiting.popleft().result()
 
 
-def _begin(header: Header, size: int, losses: Losses) -> int:
-    if _FILE.size <= header.size <= size:
+def _begin(file: BinaryIO, header: Header, losses: Losses) -> int:
+    """Where the first object begins: behind the header, or nearest to it if the header's size is wrong."""
+    file.seek(header.size)
+    ahead = file.read(4 + PADDING)
+    if b"LOBJ" in ahead:
         return header.size
-    losses.add(f"the header states {header.size} bytes for itself", "byte 4")
-    return _FILE.size
+    file.seek(_FILE.size)
+    first = file.read(WINDOW).find(b"LOBJ")
+    if first >= 0 or (ahead and header.size < _FILE.size):
+        losses.add(f"the header states {header.size} bytes for itself, and no object begins there", "byte 4")
+        return _FILE.size + max(first, 0)
+    return header.size
 
 
-def _windows(file: BinaryIO, at: int, losses: Losses) -> Iterator[Window]:
-    """Windows of whole containers and bare objects; what is neither is booked as lost."""
+def _windows(file: BinaryIO, at: int) -> Iterator[Window]:
+    """Windows of whole objects and of gaps between them."""
     file.seek(at)
     tail, synced, needed, contained = b"", True, WINDOW, False
     while True:
@@ -103,8 +110,7 @@ def _windows(file: BinaryIO, at: int, losses: Losses) -> Iterator[Window]:
         contained = contained or _begins_container(data, 0)
         found = (_linked(data, last) if synced else None) or _searched(data, synced, last, contained)
         items, end, synced = found
-        _book_gaps(at, items, losses)
-        yield Window(at, data, tuple(item for item in items if item.container or item.whole))
+        yield Window(at, data, tuple(items))
         if last:
             return
         tail, at = data[end:], at + end
@@ -133,7 +139,8 @@ def _searched(data: bytes, synced: bool, last: bool, contained: bool) -> tuple[l
     chain = follow(np.frombuffer(data + bytes(ROOM), np.uint8), synced=synced, last=last, only=only)
     sizes, kinds = chain.heads["size"].tolist(), chain.heads["type"].tolist()
     items = [Item(a, a + n, k == CONTAINER_TYPE) for a, n, k in zip(chain.at.tolist(), sizes, kinds, strict=True)]
-    items += [Item(a, b, _begins_container(data, a), whole=False) for a, b in chain.gaps]
+    for a, b in chain.gaps:
+        items.append(Item(a, b, _begins_container(data, a), whole=False, again=not (synced or a)))
     end = chain.tail
     if chain.cut:
         end = len(data)
@@ -143,13 +150,6 @@ def _searched(data: bytes, synced: bool, last: bool, contained: bool) -> tuple[l
 
 def _begins_container(data: bytes, at: int) -> bool:
     return data[at : at + 4] == b"LOBJ" and data[at + 12 : at + 16] == CONTAINER_TYPE.to_bytes(4, "little")
-
-
-def _book_gaps(at: int, items: list[Item], losses: Losses) -> None:
-    for item in items:
-        if not item.whole and not item.container:
-            what = "the file ends inside of an object" if item.cut else "no object where one must begin"
-            losses.add(what, f"byte {at + item.begin}", lost=item.end - item.begin)
 
 
 def _jobs(window: Window) -> Iterator[tuple[Window, list[Item]]]:

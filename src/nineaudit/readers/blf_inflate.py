@@ -13,14 +13,16 @@ from nineaudit.readers.blf_chain import BASE, LARGEST, PADDING
 _HEADER: Final = struct.Struct("<4xH10x")  # of every object (blf_chain.HEAD): the size of its header
 _CONTAINER: Final = struct.Struct("<H6xL4x")  # method of compression, inflated size; then the content
 _STORED, _DEFLATED = 0, 2
+NOTHING_BEGINS: Final = "no object where one must begin"
+ENDS_IN_OBJECT: Final = "the file ends inside of an object"
 
 
 @dataclass(frozen=True)
 class Piece:
     """Objects of a container, or objects that stood `bare` in the file, which began at byte `at` of it.
 
-    `fault`: why all of it is lost; `flaw`: what is wrong with it although it could be read; `stored`: bytes of it in
-    the file.
+    `fault`: why all of it is lost; `flaw`: what is wrong with it although it could be read, or though nothing of the
+    log was in it; `stored`: bytes of it in the file; `again`: the fault is that of the piece before.
     """
 
     at: int
@@ -29,18 +31,21 @@ class Piece:
     fault: str | None = None
     flaw: str | None = None
     stored: int = 0
+    again: bool = False
 
 
 @dataclass(frozen=True)
 class Item:
     """Bytes `begin` to `end` of a window: a container or another object, `whole` if the chain says so; else a gap,
-    which may begin with a container, or what there is of an object that is `cut` by the end of the file."""
+    which may begin with a container, or what there is of an object that is `cut` by the end of the file. `again`: the
+    gap goes on that the window before ends with."""
 
     begin: int
     end: int
     container: bool
     whole: bool = True
     cut: bool = False
+    again: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,12 +65,15 @@ def stated_size(data: bytes, item: Item) -> int:
 
 
 def opened(window: Window, items: Iterable[Item]) -> list[Piece]:
-    """Contents of containers, and stretches of bare objects."""
+    """Contents of containers, stretches of bare objects, and gaps."""
     out: list[Piece] = []
     view = memoryview(window.data)
     for item in _stretches(items):
         raw, at = view[item.begin : item.end], window.at + item.begin
-        out.append(_content(at, raw, item) if item.container else Piece(at, bytes(raw), bare=True))
+        if item.container:
+            out.append(_content(at, raw, item))
+        else:
+            out.append(Piece(at, bytes(raw), bare=True) if item.whole else _gap(at, len(raw), item))
     return out
 
 
@@ -73,16 +81,25 @@ def _stretches(items: Iterable[Item]) -> Iterator[Item]:
     """Items, where bare objects that follow each other are one."""
     held: Item | None = None
     for item in items:
-        if held and not item.container and item.begin - held.end <= PADDING:
+        bare = item.whole and not item.container
+        if held and bare and item.begin - held.end <= PADDING:
             held = replace(held, end=item.end)
             continue
         if held:
             yield held
-        held = None if item.container else item
-        if item.container:
+        held = item if bare else None
+        if not bare:
             yield item
     if held:
         yield held
+
+
+def _gap(at: int, size: int, item: Item) -> Piece:
+    """A gap: what is before and behind it may belong together only if no container can have been in it."""
+    what = ENDS_IN_OBJECT if item.cut else NOTHING_BEGINS
+    if size < BASE + _CONTAINER.size and not item.again:
+        return Piece(at, b"", flaw=what, stored=size)
+    return Piece(at, b"", fault=what, stored=size, again=item.again)
 
 
 def _content(at: int, raw: memoryview, item: Item) -> Piece:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from nineaudit.readers.blf_chain import ROOM, Bytes, Places, Records, follow
-from nineaudit.readers.blf_inflate import Piece
+from nineaudit.readers.blf_inflate import NOTHING_BEGINS, Piece
 from nineaudit.readers.losses import Losses
 
 _ZEROS: Final = bytes(ROOM)
@@ -72,10 +72,10 @@ class Stream:
 
     def _book(self, pieces: list[Piece]) -> None:
         for piece in pieces:
-            if piece.fault:
-                self.losses.add(piece.fault, f"byte {piece.at}", lost=piece.stored)
-            if piece.flaw:
-                self.losses.add(piece.flaw, f"byte {piece.at}")
+            what = piece.fault or piece.flaw
+            if what:
+                lost = 0 if piece.content else piece.stored
+                self.losses.add(what, f"byte {piece.at}", count=not piece.again, lost=lost)
 
     def _bare(self, pieces: list[Piece]) -> Iterator[Batch]:
         """Objects outside of containers, which are no part of the stream inside."""
@@ -92,12 +92,12 @@ class Stream:
         buffer = np.frombuffer(b"".join([*contents, _ZEROS]), dtype=np.uint8)
         chain = follow(buffer, synced=before.synced, last=last)
         batch = Batch(buffer, chain.at, chain.heads, begins, files)
-        lost = self._book_gaps(batch, chain.gaps, before.lost)
+        self._book_gaps(batch, chain.gaps, before)
         if chain.cut:
             what = "an object is cut off"
             self.losses.add(what, batch.place(chain.tail), lost=ends[-1] - chain.tail)
         self.rest = self._after(batch, buffer[chain.tail : ends[-1]].tobytes(), chain.tail, chain.synced)
-        self.rest.lost = lost and not len(chain.at)
+        self.rest.lost = before.lost and not len(chain.at)
         return batch
 
     def _after(self, batch: Batch, content: bytes, tail: int, synced: bool) -> _Rest:
@@ -105,9 +105,8 @@ class Stream:
         begins = tuple(begin - tail for begin in batch.begins[first:])
         return _Rest(content, begins, batch.files[first:], synced)
 
-    def _book_gaps(self, batch: Batch, gaps: tuple[tuple[int, int], ...], lost: bool) -> bool:
+    def _book_gaps(self, batch: Batch, gaps: tuple[tuple[int, int], ...], before: _Rest) -> None:
         for begin, end in gaps:
-            what = "rest of an object whose begin is lost" if lost else "no object where one must begin"
-            self.losses.add(what, batch.place(begin), lost=end - begin)
-            lost = False
-        return lost
+            first = begin == 0 and not before.synced
+            what = "rest of an object whose begin is lost" if first and before.lost else NOTHING_BEGINS
+            self.losses.add(what, batch.place(begin), count=not (first and what in self.losses), lost=end - begin)

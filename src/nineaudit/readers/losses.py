@@ -27,6 +27,9 @@ class Losses:
         fault.count += count
         fault.lost += lost
 
+    def __contains__(self, what: str) -> bool:
+        return what in self.faults
+
     def damage(self) -> tuple[Damage, ...]:
         """One Damage for each kind."""
         return tuple(
