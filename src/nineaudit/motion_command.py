@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -65,6 +66,10 @@ Class = Annotated[
     float | None,
     typer.Option(metavar="CLASS", help="Filter the readings first (SAE J211-1), as 180; refused if they were before."),
 ]
+Frame = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y,Z,Y,P,R", help="Anatomical frame of results: origin, yaw, pitch, roll (°) in the rig's."),
+]
 CheckTriax = Annotated[
     str | None, typer.Option(metavar="PREFIX", help="Predict this extra triax from the others; HIC, GSI deviations.")
 ]
@@ -82,6 +87,7 @@ def motion(
     velocity: Velocity = "0,0,0",
     position: Position = "0,0,0",
     gravity: Gravity = False,
+    frame: Frame = None,
     cfc: Class = None,
     check_triax: CheckTriax = None,
     worst_case: WorstCase = None,
@@ -111,7 +117,7 @@ def motion(
         writer_of(output)
     for place in outputs:
         require_absent(place, force)
-    instrument = with_points(instrument, point or [])
+    instrument = _framed(with_points(instrument, point or []), frame)
     start = _start(omega, angles, velocity, position, gravity)
     case, notes = _filtered(Case(read(recording, instrument, dbc=dbc or ())), cfc)
     found = motion_of(case, method, start)
@@ -124,11 +130,26 @@ def motion(
     return [*lines, *said], 0 if passed else 1
 
 
+def _framed(rig: Rig, text: str | None) -> Rig:
+    """The rig in an anatomical frame, if one is wanted."""
+    if text is None:
+        return rig
+    import numpy as np
+
+    from nineaudit.schemes.anatomical import in_frame
+    from nineaudit.units import factor
+
+    found = np.array(_finite(text, "--frame", "six", "x,y,z,yaw,pitch,roll"))
+    return in_frame(rig, found[:3] * factor(rig.units.length, "length"), np.radians(found[3:]))
+
+
 def _filtered(case: Case, class_: float | None) -> tuple[Case, list[str]]:
     """The case through a class, if one is wanted, and what is to be said of filters."""
     from nineaudit.case import Case
     from nineaudit.filtering import filtered, note
+    from nineaudit.schemes.requirements import require_readings
 
+    require_readings(case.array, case.recording.readings)
     said = note(case)
     if class_ is None:
         return case, [said or "no filter is stated or seen: peaks and injury values are those of unfiltered readings"]
@@ -252,8 +273,6 @@ def _written(
 
 
 def _start(omega: str | None, angles: str, velocity: str, position: str, gravity: bool) -> Start:
-    import math
-
     from nineaudit.motion import Start
 
     yaw, pitch, roll = _triple(angles, "--angles")
@@ -267,12 +286,15 @@ def _start(omega: str | None, angles: str, velocity: str, position: str, gravity
 
 
 def _triple(text: str, option: str) -> Triple:
-    """Three finite numbers with commas between them. ConfigurationError where they are not."""
-    import math
+    x, y, z = _finite(text, option, "three", "x,y,z")
+    return x, y, z
 
+
+def _finite(text: str, option: str, count: str, form: str) -> list[float]:
+    """As many finite numbers as `form` names. ConfigurationError where they are not."""
     from nineaudit.commands import numbers
 
     found = numbers(text, option) or []
-    if len(found) != 3 or not all(map(math.isfinite, found)):
-        raise ConfigurationError("not three numbers", place=option, found=text, expected="x,y,z")
-    return found[0], found[1], found[2]
+    if len(found) != len(form.split(",")) or not all(map(math.isfinite, found)):
+        raise ConfigurationError(f"not {count} numbers", place=option, found=text, expected=form)
+    return found
