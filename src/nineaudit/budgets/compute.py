@@ -166,8 +166,15 @@ class Budget:
 
     @cached_property
     def outputs(self) -> list[Output]:
-        """What is budgeted: at the rig's points, or at the origin."""
-        return outputs([(p.name, p.position) for p in self.rig.points] or [("", np.zeros(3))])
+        """What is budgeted: at the rig's points, or at the origin; only the rotation where a is not told."""
+        points = [(p.name, p.position) for p in self.rig.points] or [("", np.zeros(3))]
+        return outputs(points if self.tells_acceleration else [])
+
+    @property
+    def tells_acceleration(self) -> bool:
+        """Whether the accelerometers are on three axes."""
+        held = self.array.is_accelerometer
+        return bool(held.any()) and int(np.linalg.matrix_rank(self.array.axes[held], tol=1e-3)) == 3
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:
@@ -192,7 +199,7 @@ class Budget:
         rows = np.unique(np.linspace(0, len(time) - 1, INSTANTS).astype(int))
         place = self.rig.points[0].position if self.rig.points else np.zeros(3)
         curves: dict[str, dict[str, FloatArray]] = {}
-        for kind in ("α", "ω", "a"):
+        for kind in ("α", "ω", "a") if self.tells_acceleration else ("α", "ω"):
             found = [[self._rows(at_instant(kind, int(row), i, motion, place)) for i in range(3)] for row in rows]
             curves[kind] = {
                 source: np.array([total({str(i): axis[source] for i, axis in enumerate(axes)}) for axes in found])
@@ -222,11 +229,15 @@ class Budget:
 
 
 def typical(rig: Rig, motion: str = "general") -> Budget:
-    """The budget of a rig before any test: a simulated motion (simulate.MOTIONS, seed 0) with the rig's noise."""
+    """The budget of a rig before any test: a simulated motion (simulate.MOTIONS, seed 0) with the rig's noise. At rest
+    there is no direction to be uncertain along but that of the noise, which then stays in."""
     done = simulate(rig, motion, imperfect=False)
     case = Case(done.recording)
+    subject = f"a typical motion ({motion}, simulated, seed 0)"
+    if not done.ideal.any():
+        return Budget(case, subject)
     exact = done.ideal - (0.0 if case.rest is None else done.ideal[case.rest.samples].mean(axis=0))
-    return Budget(case, f"a typical motion ({motion}, simulated, seed 0)", exact=exact)
+    return Budget(case, subject, exact=exact)
 
 
 def budget_of(case: Case, name: str) -> Budget:

@@ -52,9 +52,13 @@ def scatter(
     values = np.array([[output.value(motion, word.time) for output in outputs] for motion in found])
     bias = values.mean(axis=0) - [output.value(base, word.time) for output in outputs]
     sd = values.std(axis=0, ddof=1)
-    limit = 0.999 * fed_back.fastest_rate(word.array, exact[:, word.array.is_accelerometer]) if _runs(word) else np.inf
-    away = any(float(np.abs(motion.omega).max()) > limit for motion in found)
+    away = _runs(word) and any(float(np.abs(motion.omega).max()) > 0.999 * _limit(word, drawn) for motion in found)
     return [Scatter(float(b), np.inf if away else float(s)) for b, s in zip(bias, sd, strict=True)]
+
+
+def _limit(word: Word, readings: list[FloatArray]) -> float:
+    """rad/s at which what runs away is held."""
+    return fed_back.fastest_rate(word.array, np.stack(readings)[..., word.array.is_accelerometer])
 
 
 def _runs(word: Word) -> bool:

@@ -61,6 +61,8 @@ def _on_the_way(budget: Budget) -> Iterator[str]:
             "α of these accelerometers needs ω: at their word, ω is fed back from rest and errors grow with the angle"
             " turned; the fit does not"
         )
+    if not budget.tells_acceleration:
+        yield "no acceleration, HIC: it takes accelerometers on three axes"
     if not spans(budget.array):
         yield (
             "the accelerometers do not span α: it is differentiated from the rates, or taken from their whole-record"
@@ -125,6 +127,10 @@ def number(value: float) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
+def _signed(value: float) -> str:
+    return f"{value:+.0f}" if abs(value) >= 100.0 else f"{value:+.2g}"
+
+
 def quantity(line: Line) -> str:
     """``peak α, rad/s²``"""
     unit = _SPELLED.get(line.unit, line.unit)
@@ -162,7 +168,7 @@ def _at_their_word(budget: Budget) -> Table:
         if line.at_their_word is not None and line.scatter is not None:
             name, found = quantity(line) + ("" if line.linear else " *"), line.scatter
             away = not np.isfinite(found.sd)
-            drawn = ("runs away", NOTHING) if away else (number(found.sd), f"{found.bias:+.2g}")
+            drawn = ("runs away", NOTHING) if away else (number(found.sd), _signed(found.bias))
             rows.append((name, number(line.value), *_cells(line.at_their_word, shown), *drawn))
     about = f"by source, their root sum of squares RSS, and Monte Carlo MC of {budget.draws} instruments with its bias"
     columns = ("output", "value", *shown, "RSS", "MC", "bias")

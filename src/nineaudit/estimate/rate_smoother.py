@@ -23,17 +23,18 @@ from nineaudit.errors import EstimationError
 
 ORDER = 3
 _DIFFERENCE = np.array([-1.0, 3.0, -3.0, 1.0])
-SMALLEST, LARGEST = 1e-7, 1e2
-"""τ/σ that is looked through: a smoother over 200 samples to one of nothing."""
+SMALLEST, LARGEST = 1e-5, 1e2
+"""τ/σ that is looked through: a smoother over some 300 samples, which rounding still allows, to one of nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Smoother:
-    """F of `count` samples for three axes of noise `sigma` (3,) rad/s, third differences of `tau` rad/s."""
+    """F of `count` samples for three axes of noise `sigma` (3,) rad/s, third differences of
+    `tau` (3,) rad/s."""
 
     count: int
     sigma: FloatArray
-    tau: float
+    tau: FloatArray
 
     def __call__(self, values: FloatArray) -> FloatArray:
         """F v (n,3) of `values` (n,3), an axis a column; F is its own transpose."""
@@ -46,7 +47,10 @@ class Smoother:
         from scipy.linalg import cholesky_banded
 
         inner = _gram(self.count)
-        return [cholesky_banded(_plus(inner * (s / self.tau) ** 2, 1.0), lower=True) for s in self.sigma]
+        return [
+            cholesky_banded(_plus(inner * (s / t) ** 2, 1.0), lower=True)
+            for s, t in zip(self.sigma, self.tau, strict=True)
+        ]
 
     def smoothed_away(self, by_omega: FloatArray) -> float:
         """Standard deviation, by the prior, of what a number with derivatives (n,3) loses: √σ²(v·Fv − |Fv|²)."""
@@ -56,24 +60,17 @@ class Smoother:
 
 
 def smoother(rates: FloatArray, sigma: FloatArray) -> Smoother:
-    """The smoother of `rates` (n,3) rad/s of noise `sigma` (3,), τ by maximum likelihood, evenly sampled.
+    """The smoother of `rates` (n,3) rad/s of noise `sigma` (3,), τ of each axis by maximum likelihood, evenly sampled.
 
     EstimationError where the record is too short to tell τ.
     """
-    from scipy.optimize import minimize_scalar
-
     if len(rates) < 4 * ORDER:
         raise EstimationError(
             "too short to smooth the rates", found=f"{len(rates)} samples", expected=f"at least {4 * ORDER}"
         )
-    differences, scale = np.diff(rates, ORDER, axis=0), float(sigma.mean())
-    ends = np.log(SMALLEST * scale), np.log(LARGEST * max(scale, float(np.abs(differences).max())))
-
-    def cost(log_tau: float) -> float:
-        return _cost(differences, sigma, float(np.exp(log_tau)))
-
-    found = minimize_scalar(cost, bounds=ends, method="bounded", options={"xatol": 1e-3})
-    return Smoother(len(rates), sigma, float(np.exp(found.x)))
+    differences = np.diff(rates, ORDER, axis=0)
+    tau = [_likeliest(d, float(s)) for d, s in zip(differences.T, sigma, strict=True)]
+    return Smoother(len(rates), sigma, np.array(tau))
 
 
 def noise_of_rates(array: SensorArray, sigma: FloatArray) -> FloatArray:
@@ -83,15 +80,21 @@ def noise_of_rates(array: SensorArray, sigma: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(weighted.T @ weighted))))
 
 
-def _cost(differences: FloatArray, sigma: FloatArray, tau: float) -> float:
-    """−ln L of τ up to a constant."""
+def _likeliest(differences: FloatArray, sigma: float) -> float:
+    """τ of third differences (m,) of rates of noise `sigma`."""
     from scipy.linalg import cho_solve_banded, cholesky_banded
+    from scipy.optimize import minimize_scalar
 
-    inner, out = _outer(len(differences)), 0.0
-    for s, d in zip(sigma, differences.T, strict=True):
-        factor = cholesky_banded(_plus(inner * s**2, tau**2), lower=True)
-        out += 0.5 * float(d @ cho_solve_banded((factor, True), d)) + float(np.log(factor[0]).sum())
-    return out
+    inner = _outer(len(differences)) * sigma**2
+
+    def cost(log_tau: float) -> float:
+        """−ln L up to a constant."""
+        factor = cholesky_banded(_plus(inner, float(np.exp(2.0 * log_tau))), lower=True)
+        return float(0.5 * differences @ cho_solve_banded((factor, True), differences) + np.log(factor[0]).sum())
+
+    ends = np.log(SMALLEST * sigma), np.log(LARGEST * max(sigma, float(np.abs(differences).max())))
+    found = minimize_scalar(cost, bounds=ends, method="bounded", options={"xatol": 1e-3})
+    return float(np.exp(found.x))
 
 
 def _plus(band: FloatArray, value: float) -> FloatArray:
