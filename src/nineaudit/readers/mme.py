@@ -101,7 +101,7 @@ def _code(listed: str) -> str:
 
 def _find(heads: Sequence[Channel], signal: str, channel: str, path: Path) -> Channel:
     for key in _NAMES:
-        hits = [head for head in heads if head.get(key) == signal]
+        hits = [head for head in heads if signal and head.get(key) == signal]
         if key == "channel code" and not hits and CODE.fullmatch(signal):
             hits = [head for head in heads if _matches(head.code, signal)]
         if len(hits) == 1:
