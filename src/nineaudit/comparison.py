@@ -29,6 +29,7 @@ from nineaudit.physics import filters, rigid_body
 from nineaudit.rig import Point
 from nineaudit.scheme_runs import Scheme, remarks, schemes_of
 from nineaudit.schemes import martin, rating
+from nineaudit.schemes.requirements import require_readings
 
 DRAWS: Final = 16
 """Draws of the instrument: the standard deviation of a budget is known to 1/√(2·15), 18 %."""
@@ -100,14 +101,17 @@ def compare(
     """
     if draws < 2:
         raise ConfigurationError("too few draws", place="--draws", found=draws, expected="2 or more")
+    require_readings(case.array, case.recording.readings, each=True)
     class_ = _class(case, cfc)
     schemes = {name: _filtered(scheme, case, class_) for name, scheme in schemes_of(case).items()}
     readings = bridge(case.condensed.readings, case.condensed.time)
     motions, refused = _run(schemes, readings)
     chosen = _reference(reference, tuple(schemes), motions, refused)
+    sample, failed = _drawn(case, {name: schemes[name] for name in motions}, motions[chosen], readings, draws, seed)
+    motions, refused = {name: motions[name] for name in motions if name not in failed}, refused | failed
+    chosen = _reference(reference, tuple(schemes), motions, refused)
     points = case.recording.rig.points
     curves = {name: outputs(motion, points) for name, motion in motions.items()}
-    sample = _drawn(case, {name: schemes[name] for name in motions}, motions[chosen], readings, draws, seed)
     spread = [{name: outputs(m, points) for name, m in drawn.items()} for drawn in sample]
     rows = [
         _row(name, quantity, axis, case.condensed.time, curves, chosen, spread)
@@ -194,21 +198,22 @@ def _reference(
 
 def _drawn(
     case: Case, schemes: Mapping[str, Scheme], motion: Motion, readings: FloatArray, draws: int, seed: int
-) -> list[dict[str, Motion]]:
-    """Motions by scheme for each draw of calibration errors and noise added to the readings; a draw in which a scheme
-    fails is left out for all."""
+) -> tuple[list[dict[str, Motion]], dict[str, str]]:
+    """Motions by scheme for each draw of calibration errors and noise added to the readings; and the schemes that fail
+    in one of them, with the reason: their budget cannot be told."""
     columns = calibration.all_columns(case.array, readings, case.condensed.time, motion)
     rng = np.random.default_rng(seed)
-    out = []
+    out: list[dict[str, Motion]] = []
+    failed: dict[str, str] = {}
     for _ in range(draws):
         errors = np.einsum("knp,kp->nk", columns, rng.standard_normal((len(case.array), columns.shape[2])))
         noise = rng.standard_normal(readings.shape) * case.condensed.sigma
-        found, failed = _run(schemes, readings + errors + noise)
-        if not failed:
-            out.append(found)
-    if len(out) < 2:
-        raise EstimationError("the schemes fail on readings changed within the rig's uncertainties", found=len(out))
-    return out
+        found, fails = _run(
+            {name: run for name, run in schemes.items() if name not in failed}, readings + errors + noise
+        )
+        failed |= {name: f"on readings changed within the rig's uncertainties: {why}" for name, why in fails.items()}
+        out.append(found)
+    return out, failed
 
 
 def _row(

@@ -25,6 +25,7 @@ from nineaudit.motion_methods import AT_REST, Start, by_fit, method_named
 from nineaudit.physics import kinematics, laboratory, rigid_body
 from nineaudit.physics.laboratory import Path
 from nineaudit.rig import Point
+from nineaudit.schemes.requirements import require_readings
 from nineaudit.units import G0
 
 __all__ = ["Kinematics", "Start", "Value", "motion_of"]
@@ -85,6 +86,7 @@ def motion_of(case: Case, method: str = "map", start: Start = AT_REST, count: in
     ConfigurationError: unknown method. EstimationError: the array or the recording does not give the motion.
     """
     solve = method_named(method)
+    require_readings(case.array, case.recording.readings)
     at = by_fit(case, start) if method == "map" else None
     motion = _whole(at.motion, case.time) if at is not None else solve(case, start)
     rest = None if case.rest is None else case.rest.start

@@ -13,12 +13,13 @@ import numpy as np
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
-from nineaudit.estimate import parity, trajectory
+from nineaudit.estimate import trajectory
 from nineaudit.estimate.deferred import deferred
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, estimate_motion, has_rates
 from nineaudit.estimate.samples import Samples, at_samples
 from nineaudit.physics import kinematics, nap, rigid_body
 from nineaudit.schemes import growth, martin, ninacc, rgla
+from nineaudit.schemes.requirements import require_acceleration, require_alpha, require_readings
 
 Vector = tuple[float, float, float]
 
@@ -46,13 +47,7 @@ def by_fit(case: Case, start: Start) -> Samples:
     A stated ω(0) is where the fit starts from, for records without a quiet interval; the readings decide.
     EstimationError where the accelerometers do not tell α: differences of ω would be all that is left of it.
     """
-    if not parity.tells_alpha(case.array):
-        rates = has_rates(case.array)
-        raise EstimationError(
-            "the accelerometers do not tell α, and the fit leaves it to differences of ω",
-            expected="accelerometers of rank 6",
-            advice="use --method rates" if rates else "see nineaudit budget for what the array can tell",
-        )
+    require_alpha(case.array)
     found = case.healthy if start.omega is None else trajectory.fit(case.fit_data, _from(case, start.omega))
     return at_samples(deferred(found), case.time, case.readings, case.sigma)
 
@@ -84,6 +79,7 @@ def _padgaonkar(case: Case, start: Start) -> Motion:
             advice="use --method map, or ninacc for triaxes",
         )
     columns, arms = list(found[0]), found[1]
+    require_readings(case.array.select(columns), case.readings[:, columns], each=True)
     y, centre = bridge(case.readings[:, columns], case.time), case.array.positions[columns[0]]
     alpha = y @ nap.alpha_rows(arms).T
     omega = _omega(case, alpha, start)
@@ -133,8 +129,10 @@ def _rates(case: Case, start: Start) -> Motion:
         raise EstimationError(
             "no rate sensors on three axes",
             found=f"{int((~case.array.is_accelerometer).sum())} rate sensors",
-            advice="use --method map",
+            expected="three or more, axes of rank 3",
+            advice="add some, or use --method map where the accelerometers tell α",
         )
+    require_acceleration(case.array)
     rest = None if case.rest is None else case.rest.start
     found = estimate_motion(case.array, case.time, case.readings, case.sigma, rest)
     omega, alpha, a0 = (bridge(v, case.time) for v in (found.omega, found.alpha, found.a0))

@@ -12,8 +12,8 @@ from nineaudit.case import Case
 from nineaudit.errors import EstimationError
 from nineaudit.estimate.motion import Motion, estimate_motion, has_rates
 from nineaudit.estimate.trajectory import Fit, fit
-from nineaudit.physics import rigid_body
 from nineaudit.schemes import growth, martin, ninacc, rgla, takhounts
+from nineaudit.schemes.requirements import require_alpha
 
 Scheme = Callable[[FloatArray], Motion]
 """Readings (m,k) SI of the blocks of a case to the motion; EstimationError where the sensors do not allow it."""
@@ -24,25 +24,15 @@ def schemes_of(case: Case) -> dict[str, Scheme]:
     blocks, array = case.condensed, case.array
     time, sigma = blocks.time, blocks.sigma
     fitted: list[Fit] = []
-    sensed = rigid_body.design(array.positions, array.axes)[array.is_accelerometer] * [1, 1, 1, 20, 20, 20]
-    rank = int(np.linalg.matrix_rank(sensed, tol=1e-3)) if len(sensed) else 0
-
-    def require_alpha() -> None:
-        if rank < 6:
-            raise EstimationError(
-                "no accelerometers tell α, the fit leaves it to differences of ω",
-                found=f"rank {rank}",
-                expected="rank 6",
-            )
 
     def by_map(readings: FloatArray) -> Motion:
-        require_alpha()
+        require_alpha(array)
         data = replace(case.fit_data, readings=readings)
         fitted.append(fit(data, fitted[0].omega, fitted[0].theta) if fitted else case.healthy)
         return fitted[-1].motion
 
     def by_fit_at_its_word(readings: FloatArray) -> Motion:
-        require_alpha()
+        require_alpha(array)
         return takhounts.optimise(replace(case.fit_data, readings=readings)).motion
 
     def by_padgaonkar(readings: FloatArray) -> Motion:
