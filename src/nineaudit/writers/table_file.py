@@ -51,7 +51,7 @@ def write_parquet(recording: Recording, readings: FloatArray, path: Path, _: Seq
         buffers = [pa.py_buffer(present.tobytes()), pa.py_buffer(column.tobytes())]
         arrays.append(pa.Array.from_buffers(pa.float64(), column.size, buffers))
     with path.open("xb") as file:
-        pq.write_table(pa.table(arrays, names=names), file)
+        pq.write_table(pa.table(arrays, names=names), file, write_page_checksum=True)
     return Outcome()
 
 
