@@ -18,7 +18,7 @@ from pathlib import Path
 from nineaudit.errors import RecordingError
 from nineaudit.readers.blf_columns import Columns
 from nineaudit.readers.blf_containers import Header, pieces, read_header
-from nineaudit.readers.blf_frames import BEYOND, Account, frames_of
+from nineaudit.readers.blf_frames import BEYOND, Account, add_frames
 from nineaudit.readers.blf_objects import TYPES
 from nineaudit.readers.blf_stream import Stream
 from nineaudit.readers.can_frames import Frames
@@ -47,7 +47,7 @@ def read_blf(path: Path, threads: int = 1) -> Frames:
         columns = Columns(min(header.objects, size // _LEAST_OF_A_FRAME))
         contents = pieces(file, header, threads, losses)
         for batch in Stream(losses).batches(contents):
-            columns.append(frames_of(batch, account))
+            add_frames(columns, batch, account)
     _check_header(header, size, account)
     log = columns.frames(
         counts=_counts(header, size, account),

@@ -22,18 +22,14 @@ Records = NDArray[np.void]
 # Every object, as Vector BLF by T. Lorenz and python-can's blf.py have it: signature LOBJ, size and version of the
 # header, size of the object, its type. In versions 1 and 2 of the header (32 and 40 bytes) follow the unit of time, a
 # client's index or a status, the object's version and its time; version 2 has an original time behind that.
+# `form` is the header's size and version in one.
 HEAD: Final = np.dtype(
-    [
-        ("signature", "<u4"),
-        ("header", "<u2"),
-        ("version", "<u2"),
-        ("size", "<u4"),
-        ("type", "<u4"),
-        ("flags", "<u4"),
-        ("client", "<u2"),
-        ("object_version", "<u2"),
-        ("time", "<u8"),
-    ]
+    {
+        "names": ["form", "header", "version", "size", "type", "flags", "time"],
+        "formats": ["<u4", "<u2", "<u2", "<u4", "<u4", "<u4", "<u8"],
+        "offsets": [4, 4, 6, 8, 12, 16, 24],
+        "itemsize": 32,
+    }
 )
 BASE: Final = 16
 """Bytes of the part that all headers have."""
@@ -102,12 +98,19 @@ def _candidates(buffer: Bytes, n: int, step: int) -> _Candidates:
         at = np.sort(np.concatenate([at, *(_signatures(buffer, n, phase) for phase in range(1, 4))]))
     heads = gather(buffer, at, HEAD)
     end = at + heads["size"]
-    header = heads["header"]
-    plausible = (header >= BASE) & (header <= heads["size"]) & (header <= _LONGEST_HEADER)
-    plausible &= (heads["version"] - np.uint16(1) < 3) & (heads["size"] <= LARGEST)
-    headless = at + BASE > n
-    end[headless], plausible[headless] = n + 1, True
+    plausible = _plausible(heads)
+    headless = at[-(BASE // 4) :] + BASE > n  # no more signatures than these fit into the last bytes
+    end[-(BASE // 4) :][headless], plausible[-(BASE // 4) :][headless] = n + 1, True
     return _Candidates(at, heads, end, plausible, n)
+
+
+def _plausible(heads: Records) -> NDArray[np.bool_]:
+    """(m,) true where the sizes and the version of a header can be."""
+    size, form = heads["size"], heads["form"]
+    uniform = len(heads) and int(form.min()) == int(form.max())
+    header, version = (heads[name][:1] if uniform else heads[name] for name in ("header", "version"))
+    fits = (header >= BASE) & (header <= _LONGEST_HEADER) & (version - np.uint16(1) < 3)
+    return np.asarray(fits & (size >= header) & (size <= LARGEST))
 
 
 def _signatures(buffer: Bytes, n: int, phase: int) -> Places:

@@ -2,72 +2,103 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nineaudit.readers.blf_frames import Part
-from nineaudit.readers.can_frames import LONG, SHORT, Frames, frames
+from nineaudit.readers.can_frames import LONG, SHORT, Frames
 
-_FIELDS: Final = ("time", "key", "channel", "kind", "length", "data", "long_rows", "long")
+Rows = NDArray[np.intp]
+Words = NDArray[np.uint64]
+
+_WORD: Final = np.dtype("<u8")
+_DTYPES: Final = {"time": "i8", "key": "u4", "channel": "u2", "kind": "u1", "length": "u1", "data": _WORD}
 _SMALL: Final = 1 << 17
 """Rows up to which a column grows by doubling, since then by a quarter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Room for n frames that follow each other, to be filled: columns as in Frames, but `channel` (n,) as the log has
+    it, and `data` (n,) the first eight bytes as a word."""
+
+    time: NDArray[np.int64]
+    key: NDArray[np.uint32]
+    channel: NDArray[np.uint16]
+    kind: NDArray[np.uint8]
+    length: NDArray[np.uint8]
+    data: Words
 
 
 class _Column:
     """Rows of one column. Where they are full, room is made where they stand, if the system can."""
 
-    def __init__(self, like: NDArray[Any], room: int) -> None:
-        self._rows, self._count = np.empty((room, *like.shape[1:]), dtype=like.dtype), 0
+    def __init__(self, expected: int, dtype: Any, *width: int) -> None:
+        self._rows, self._count = np.empty((expected, *width), dtype=dtype), 0
 
-    def append(self, block: NDArray[Any]) -> None:
-        end = self._count + len(block)
-        if end > len(self._rows):
-            self._resize(max(end, self._count + max(self._count // 4, min(self._count, _SMALL))))
-        self._rows[self._count : end] = block
-        self._count = end
+    def room(self, count: int) -> NDArray[Any]:
+        """The next rows, to be filled before more are asked for."""
+        begin, self._count = self._count, self._count + count
+        if self._count > len(self._rows):
+            self._resize(max(self._count, begin + max(begin // 4, min(begin, _SMALL))))
+        return self._rows[begin : self._count]
 
     def array(self) -> NDArray[Any]:
         self._resize(self._count)
         return self._rows
 
     def _resize(self, count: int) -> None:
-        # No view of the rows is ever handed out before the last time, so none can be left behind.
+        # No room that was given out is in use any more, and the whole is given out once, at the end.
         self._rows.resize((count, *self._rows.shape[1:]), refcheck=False)
 
 
 class Columns:
-    """Parts of a log, put behind each other. `expected`: about how many frames there will be."""
+    """Frames of a log, part by part. `expected`: about how many there will be."""
 
     def __init__(self, expected: int) -> None:
-        self._columns: dict[str, _Column] = {}
-        self._count, self._expected = 0, expected
+        self._columns = {name: _Column(expected, dtype) for name, dtype in _DTYPES.items()}
+        self._long_rows, self._long = _Column(0, np.intp), _Column(0, _WORD, LONG // 8)
         self._present = np.zeros(1 << 16, dtype=np.bool_)
+        self._part: Part | None = None
+        self._begin = self._count = 0
 
-    def append(self, part: Part) -> None:
-        """Frames that follow in the log."""
-        for name in _FIELDS:
-            block = getattr(part, name)
-            if name not in self._columns:
-                self._columns[name] = _Column(block, 0 if name.startswith("long") else self._expected)
-            self._columns[name].append(block + self._count if name == "long_rows" else block)
-        self._present[part.channel] = True
-        self._count += len(part.time)
+    def room(self, count: int) -> Part:
+        """Room for the frames that follow, which must be filled before more is asked for."""
+        self._note_channels()
+        self._begin, self._count = self._count, self._count + count
+        self._part = Part(**{name: column.room(count) for name, column in self._columns.items()})
+        return self._part
+
+    def add_long(self, some: list[tuple[Rows, Words]]) -> None:
+        """Those frames of the last part that have more than eight bytes: rows of the part, and (m,8) words."""
+        if not some:
+            return
+        rows, words = (np.concatenate([one[i] for one in some]) if len(some) > 1 else some[0][i] for i in (0, 1))
+        if len(some) > 1:
+            order = np.argsort(rows, kind="stable")
+            rows, words = rows[order], words[order]
+        np.add(rows, self._begin, out=self._long_rows.room(len(rows)))
+        self._long.room(len(rows))[:] = words
+
+    def _note_channels(self) -> None:
+        if self._part is not None:
+            self._present[self._part.channel] = True
+            self._part = None
 
     def frames(self, **rest: Any) -> Frames:
-        """All of them; `rest` are the fields of the whole log."""
-        if not self._count:
-            return frames([], [], [], [], [], np.empty((0, SHORT), dtype=np.uint8), **rest)
+        """All of them, once; `rest` are the fields of the whole log."""
+        self._note_channels()
         columns = {name: column.array() for name, column in self._columns.items()}
         present = np.flatnonzero(self._present)
         codes = (np.cumsum(self._present) - 1).astype(np.uint16)
-        data, long = columns.pop("data"), columns.pop("long")
         return Frames(
             bus=codes[columns.pop("channel")],
             buses=tuple(map(str, present.tolist())),
-            data=data.view(np.uint8).reshape(-1, SHORT),
-            long=long.view(np.uint8).reshape(-1, LONG),
+            data=columns.pop("data").view(np.uint8).reshape(-1, SHORT),
+            long_rows=self._long_rows.array(),
+            long=self._long.array().view(np.uint8).reshape(-1, LONG),
             **columns,
             **rest,
         )

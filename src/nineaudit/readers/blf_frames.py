@@ -5,43 +5,28 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nineaudit.readers.blf_chain import HEAD, Records, gather
+from nineaudit.readers.blf_columns import Columns, Part, Rows
 from nineaudit.readers.blf_objects import TYPES, Found, Group, Words
 from nineaudit.readers.blf_stream import Batch
-from nineaudit.readers.can_frames import LONG, SHORT
+from nineaudit.readers.can_frames import SHORT
 from nineaudit.readers.losses import Losses
 from nineaudit.signals import can_origin
 
 Codes = NDArray[np.uint8]
-Rows = NDArray[np.intp]
 
 _TENS, _NANOSECONDS = 1, 2
 _TEN_MICROSECONDS: Final = 10_000
 _MARKER: Final = 96
 BEYOND: Final = 255
 """Code that stands for all types from 255 on, of which none is a CAN frame."""
+UNKNOWN_UNIT: Final = "frames stamped in a unit that is not known, read as ns"
 _LEAST: Final = np.array([TYPES[t].least if t in TYPES else 0 for t in range(BEYOND + 1)], dtype=np.uint32)
-_WORD: Final = np.dtype("<u8")
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """Frames of one batch in order: columns as in Frames, but `channel` (n,) as the log has it and data in words:
-    `data` (n,), `long` (m,8)."""
-
-    time: NDArray[np.int64]
-    key: NDArray[np.uint32]
-    channel: NDArray[np.uint16]
-    kind: Codes
-    length: Codes
-    data: Words
-    long_rows: Rows
-    long: Words
 
 
 @dataclass
@@ -56,20 +41,23 @@ class Account:
     origin: int = 0
 
 
-def frames_of(batch: Batch, account: Account) -> Part:
-    """Frames of a batch of objects, in order."""
+def add_frames(columns: Columns, batch: Batch, account: Account) -> None:
+    """Put the frames of a batch of objects behind those there are, in order."""
     codes = np.minimum(batch.heads["type"], np.uint32(BEYOND)).astype(np.uint8)
-    present = np.flatnonzero(np.bincount(codes)).tolist()
+    seen = np.zeros(BEYOND + 1, dtype=np.bool_)
+    seen[codes] = True
+    present = np.flatnonzero(seen).tolist()
     _take_stock(batch, codes, present, account)
-    rows = _frame_rows(batch, codes, account)
-    if len(rows) < len(codes):
-        codes, batch = codes[rows], replace(batch, at=batch.at[rows], heads=batch.heads[rows])
-    part, long = _empty(_time(batch.heads, account)), []
+    keep = _keep(batch, codes, account)
+    if keep is not None:
+        codes, batch = codes[keep], replace(batch, at=batch.at[keep], heads=batch.heads[keep])
+    part, long = columns.room(len(codes)), []
+    _put_time(part.time, batch.heads, account)
     for code in present:
         if code in TYPES:
             for group, found in _read(batch, codes, code, account):
                 long.append(_put(part, group, found))
-    return _with_long(part, [some for some in long if some is not None])
+    columns.add_long([some for some in long if some is not None])
 
 
 def _take_stock(batch: Batch, codes: Codes, present: list[int], account: Account) -> None:
@@ -89,12 +77,13 @@ def _origin(batch: Batch, rows: Rows) -> int:
     return 0
 
 
-def _frame_rows(batch: Batch, codes: Codes, account: Account) -> Rows:
-    """Rows of the objects that are frames, and large enough to be."""
+def _keep(batch: Batch, codes: Codes, account: Account) -> NDArray[np.bool_] | None:
+    """(m,) true for the objects that are frames, and fit to be; None if all are."""
     heads, least = batch.heads, _LEAST[codes]
+    header = heads["header"]
     frames = least > 0
-    small = frames & (heads["size"] < heads["header"] + least)
-    strange = frames & ((heads["version"] > 2) | (heads["header"] < HEAD.itemsize))
+    small = frames & (heads["size"] < header + least)
+    strange = frames & ((heads["version"] > 2) | (header < HEAD.itemsize))
     late = frames & _late(heads, account.start)
     for what, fault in (
         ("a frame's object is smaller than its fields", small),
@@ -104,40 +93,31 @@ def _frame_rows(batch: Batch, codes: Codes, account: Account) -> Rows:
         if fault.any():
             _book(account, batch, what, fault, int(heads["size"][fault].sum()))
             frames &= ~fault
-    return np.flatnonzero(frames)
+    return None if frames.all() else frames
 
 
 def _book(account: Account, batch: Batch, what: str, fault: NDArray[np.bool_], lost: int = 0) -> None:
     account.losses.add(what, batch.place(int(batch.at[fault.argmax()])), int(np.count_nonzero(fault)), lost)
 
 
-def _late(heads: Records, start: int) -> NDArray[np.bool_]:
-    """(m,) true where a time does not fit into int64 ns."""
+def _late(heads: Records, start: int) -> Any:
+    """(m,) true where a time does not fit into int64 ns; False if there is none."""
     most = np.iinfo(np.int64).max - max(start, 0)
     if int(heads["time"].max(initial=0)) <= most // _TEN_MICROSECONDS:
-        return np.zeros(len(heads), dtype=np.bool_)
+        return False
     limit = np.where(heads["flags"] == _TENS, most // _TEN_MICROSECONDS, most)
-    return np.asarray(heads["time"] > limit.astype(np.uint64))
+    return heads["time"] > limit.astype(np.uint64)
 
 
-def _time(heads: Records, account: Account) -> NDArray[np.int64]:
-    """(m,) ns: since 1970 where the log's header has a date, else since the log's start."""
-    unit, time = heads["flags"], heads["time"].astype(np.int64)
-    tens = unit == _TENS
-    if tens.any():
+def _put_time(time: NDArray[np.int64], heads: Records, account: Account) -> None:
+    """Fill (m,) ns: since 1970 where the log's header has a date, else since the log's start."""
+    time[:] = heads["time"]
+    other = heads["flags"] != _NANOSECONDS
+    if other.any():
+        tens = heads["flags"] == _TENS
         time[tens] *= _TEN_MICROSECONDS
-    other = int(np.count_nonzero(unit != _NANOSECONDS) - np.count_nonzero(tens))
-    account.odd["frames stamped in a unit that is not known, read as ns"] += other
+        account.odd[UNKNOWN_UNIT] += int(np.count_nonzero(other & ~tens))
     time += account.start
-    return np.asarray(time)
-
-
-def _empty(time: NDArray[np.int64]) -> Part:
-    n = len(time)
-    key, channel = np.empty(n, dtype=np.uint32), np.empty(n, dtype=np.uint16)
-    kind, length, data = np.empty(n, dtype=np.uint8), np.empty(n, dtype=np.uint8), np.empty(n, dtype=_WORD)
-    none = np.empty(0, dtype=np.intp), np.empty((0, LONG // 8), dtype=_WORD)
-    return Part(time, key, channel, kind, length, data, *none)
 
 
 def _read(batch: Batch, codes: Codes, code: int, account: Account) -> Iterator[tuple[Rows, Found]]:
@@ -173,14 +153,3 @@ def _put(part: Part, rows: Rows, found: Found) -> tuple[Rows, Words] | None:
     part.data[rows] = found.data[:, 0]
     long = np.flatnonzero(found.length > SHORT)
     return rows[long], found.data[long]
-
-
-def _with_long(part: Part, long: list[tuple[Rows, Words]]) -> Part:
-    if not long:
-        return part
-    rows = np.concatenate([some for some, _ in long])
-    words = np.concatenate([some for _, some in long])
-    if len(long) > 1:
-        order = np.argsort(rows, kind="stable")
-        rows, words = rows[order], words[order]
-    return replace(part, long_rows=rows, long=words)

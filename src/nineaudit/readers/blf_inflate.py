@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
@@ -13,6 +14,8 @@ from nineaudit.readers.blf_chain import BASE, LARGEST, PADDING
 _HEADER: Final = struct.Struct("<4xH10x")  # of every object (blf_chain.HEAD): the size of its header
 _CONTAINER: Final = struct.Struct("<H6xL4x")  # method of compression, inflated size; then the content
 _STORED, _DEFLATED = 0, 2
+_DENSEST: Final = 1032
+"""Bytes that one deflated byte can be at most: what is short enough can be inflated without a limit."""
 NOTHING_BEGINS: Final = "no object where one must begin"
 ENDS_IN_OBJECT: Final = "the file ends inside of an object"
 
@@ -135,6 +138,9 @@ def _stored(body: memoryview, stated: int) -> tuple[bytes, str | None, bool]:
 
 def _inflated(body: memoryview, stated: int) -> tuple[bytes, str | None, bool]:
     """Content, why there is none, and whether it is all; never more than LARGEST bytes, whatever is stated."""
+    if len(body) <= LARGEST // _DENSEST and stated <= LARGEST:
+        with contextlib.suppress(zlib.error):  # what is wrong is found below
+            return zlib.decompress(body, bufsize=stated or 1), None, True
     stream = zlib.decompressobj()
     try:
         content = stream.decompress(body, min(stated, LARGEST) + 1)

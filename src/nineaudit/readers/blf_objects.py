@@ -95,11 +95,23 @@ class Type:
 
 def _classic(group: Group) -> Found:
     record = group.record
-    kind = _FLAGS[record["flags"]]
-    group.odd(REQUESTS, _count(record["flags"] & _DIRECTION == _REQUEST))
+    kind = _sent(record["flags"], group)
     remote = kind & REMOTE != 0
     length = _there(_short(record["dlc"], group), group.room - _HEAD, remote, group)
-    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[length * ~remote, 0])
+    return Found(record["channel"], record["id"] & _KEY, kind, length, _cut(record["data"], length * ~remote))
+
+
+def _cut(data: Words, length: NDArray[np.uint8]) -> Words:
+    """Words of which only so many bytes are data, the rest zero."""
+    return data.copy() if length.min(initial=SHORT) == SHORT else data & _KEEP[length, 0]
+
+
+def _sent(flags: NDArray[np.uint8], group: Group) -> NDArray[np.uint8]:
+    """Kinds of frames as far as the flags of older types of objects tell them."""
+    if not flags.any():
+        return np.zeros(len(flags), dtype=np.uint8)
+    group.odd(REQUESTS, _count(flags & _DIRECTION == _REQUEST))
+    return _FLAGS[flags]
 
 
 def _there(length: NDArray[np.uint8], there: NDArray[np.int64], remote: Any, group: Group) -> NDArray[np.uint8]:
@@ -123,8 +135,7 @@ def _short(dlc: NDArray[np.uint8], group: Group) -> NDArray[np.uint8]:
 
 def _fd(group: Group) -> Found:
     record = group.record
-    group.odd(REQUESTS, _count(record["flags"] & _DIRECTION == _REQUEST))
-    kind = _FLAGS[record["flags"]] | _FD_FLAGS[record["fd"]]
+    kind = _sent(record["flags"], group) | _FD_FLAGS[record["fd"]]
     remote = kind & REMOTE != 0
     length = _there(_valid(group, kind, remote), group.room - (_FD.itemsize - LONG), remote, group)
     return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[length * ~remote])
