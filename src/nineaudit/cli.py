@@ -80,12 +80,15 @@ def check(
 ) -> None:
     """Audit recordings: which rules hold, which channel is at fault, what that does to the results."""
     from nineaudit import checking
+    from nineaudit.parts import recordings as each_recording
     from nineaudit.rig import load_rig
     from nineaudit.waivers import load_waivers
 
     instrument, book = load_rig(rig), checking.load_book(rules, select, ignore)
     accepted = None if waivers is None else load_waivers(waivers, checking.load_book(rules).codes)
-    inputs = (rig, waivers, *(dbc or instrument.dbc))
+    originals = [file for recording in recordings for file in instrument.files(recording)]
+    inputs = (*originals, rig, waivers, *(dbc or instrument.dbc))
+    recordings = list(each_recording(recordings, instrument.parts))
     files = checking.files(recordings, inputs, html=html, json=json, junit=junit, summary=summary)
     outcomes = checking.audit_each(recordings, instrument, book, accepted, dbc or ())
     code = checking.run(
@@ -117,7 +120,7 @@ def repair(
     from nineaudit.rig import load_rig
 
     instrument = load_rig(rig)
-    protect([output], [recording, rig, *(dbc or instrument.dbc)])
+    protect([output], [*instrument.files(recording), rig, *(dbc or instrument.dbc)])
     audit = commands.audit_one(recording, instrument, dbc or ())
     _print(commands.repaired(audit, output, channel=channel, reason=reason, by=by, dbc=dbc or (), force=force))
 
@@ -197,7 +200,7 @@ def budget(
     from nineaudit.rig import load_rig
 
     instrument = load_rig(rig)
-    protect([html], [rig, recording, *(dbc or instrument.dbc)])
+    protect([html], [rig, *(instrument.files(recording) if recording else ()), *(dbc or instrument.dbc)])
     _print(commands.budgeted(instrument, recording, motion=motion, html=html, dbc=dbc or ()))
 
 

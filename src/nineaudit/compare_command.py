@@ -45,7 +45,7 @@ def compare(
     from nineaudit.rig import load_rig
 
     instrument = load_rig(rig)
-    protect([html, json], [recording, rig, *(dbc or instrument.dbc)])
+    protect([html, json], [*instrument.files(recording), rig, *(dbc or instrument.dbc)])
     found = read(recording, instrument, dbc=dbc or ())
     compared = comparison.compare(Case(found), reference, draws, cfc=cfc)
     lines = comparison_page.lines(compared, found)

@@ -112,7 +112,7 @@ def motion(
     method_named(method)
     instrument = load_rig(rig)
     outputs = () if output is None else files_of(output)
-    protect([*outputs, html], [recording, rig, *(dbc or instrument.dbc)])
+    protect([*outputs, html], [*instrument.files(recording), rig, *(dbc or instrument.dbc)])
     if output is not None:
         writer_of(output)
     for place in outputs:

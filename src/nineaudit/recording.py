@@ -91,7 +91,8 @@ class Damage:
 @dataclass(frozen=True)
 class Source:
     """The file that was read. `counts`: what its container held (frames, error frames, ...); `notes`: in words;
-    `damage`: what of it could not be read."""
+    `damage`: what of it could not be read. `parts`: every file, where the recording has several; `path`, `sha256` and
+    `size` are then those of the first."""
 
     path: Path
     format: str
@@ -101,6 +102,12 @@ class Source:
     counts: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     damage: tuple[Damage, ...] = ()
+    parts: tuple[Source, ...] = ()
+
+    @property
+    def files(self) -> tuple[Source, ...]:
+        """The file, or each of the parts."""
+        return self.parts or (self,)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from nineaudit.diagnose import Status
 from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.readers import fingerprint
 from nineaudit.reconstruct import Reconstruction
+from nineaudit.recording import Source
 from nineaudit.writers import write_recording
 
 SCHEMA = "nineaudit/provenance/1"
@@ -75,6 +76,10 @@ def repaired_readings(audit: Audit, rebuilt: Reconstruction) -> FloatArray:
     return out
 
 
+def _original(source: Source) -> dict[str, Any]:
+    return {"path": source.path.name, "sha256": source.sha256, "bytes": source.size, "altered": False}
+
+
 def provenance(
     audit: Audit, rebuilt: Reconstruction, output: Path, reason: str, by: str, now: datetime
 ) -> dict[str, Any]:
@@ -82,7 +87,7 @@ def provenance(
     source, rig, diagnosis = audit.recording.source, audit.recording.rig, audit.diagnosis
     return {
         "schema": SCHEMA,
-        "original": {"path": source.path.name, "sha256": source.sha256, "bytes": source.size, "altered": False},
+        "original": _original(source) | ({"parts": [_original(part) for part in source.parts]} if source.parts else {}),
         "output": {"path": output.name, "sha256": fingerprint(output)[1]},
         "rig": {"name": rig.name, "sha256": rig.sha256},
         "rulebook": {"sha256": audit.rulebook.sha256},

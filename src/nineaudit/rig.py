@@ -6,7 +6,7 @@ Rig, Point and Units load without pydantic; reading a file needs it (rig_file.py
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray, Kind, SensorArray, frozen
 from nineaudit.errors import ConfigurationError
+from nineaudit.parts import NAME, Part, files, in_one_file
 from nineaudit.presets import PRESETS, preset_text
 from nineaudit.units import factor
 
@@ -51,7 +52,8 @@ class Rig:
 
     `pre_trigger` (start, end) in s, the body at rest. `dbc` resolved against the rig file. `time_unit` None:
     by the suffix of the time column. `separator` and `decimal` of CSV, None where they are to be detected.
-    `sha256` of the file's bytes (of the text where there is no file); `text` as it was read.
+    `parts`: the files of a recording, where it has several. `sha256` of the file's bytes (of the text where there is no
+    file); `text` as it was read.
     """
 
     name: str
@@ -69,6 +71,15 @@ class Rig:
     text: str = ""
     separator: str | None = None
     decimal: str | None = None
+    parts: tuple[Part, ...] = ()
+
+    def files(self, recording: Path) -> tuple[Path, ...]:
+        """All files of the recording that a path names."""
+        return files(recording, self.parts)
+
+    def in_one_file(self) -> Rig:
+        """The rig of a file that holds all channels, as `repair` writes it."""
+        return replace(self, array=in_one_file(self.array), parts=()) if self.parts else self
 
     @property
     def cfc(self) -> float | None:
@@ -129,6 +140,7 @@ def parse_rig(text: str, path: Path | None = None) -> Rig:
         text=text,
         separator=recording.separator,
         decimal=recording.decimal,
+        parts=_parts(tables, array, path),
     )
 
 
@@ -158,6 +170,43 @@ def _databases(names: Iterable[str], path: Path | None) -> tuple[Path, ...]:
                 expected=f"a file relative to {folder.absolute()}",
             )
     return found
+
+
+def _parts(tables: RigFile, array: SensorArray, path: Path | None) -> tuple[Part, ...]:
+    """The parts; ConfigurationError where a channel is not in exactly one, or only some patterns have a {name}."""
+    from nineaudit.rig_sensors import check_unique
+
+    parts = tuple(
+        Part(
+            p.file, tuple(p.channels), p.time, p.time_unit, p.offset_s or 0.0, p.offset_u_s or 0.0, p.align != "stamps"
+        )
+        for p in tables.part
+    )
+    check_unique("file", [(f"[[part]] {i}", part.file) for i, part in enumerate(parts, 1)], path)
+    placed = [(f"[[part]] {i}", channel) for i, part in enumerate(parts, 1) for channel in part.channels]
+    check_unique("channel", placed, path)
+    said, known = [channel for _, channel in placed], set(array.channels)
+    for where, channel in placed:
+        if channel not in known:
+            expected = "one of " + ", ".join(array.channels)
+            raise ConfigurationError("no such channel", file=path, place=where, found=channel, expected=expected)
+    for channel in array.channels if parts else ():
+        if channel not in said:
+            raise ConfigurationError(f"channel {channel} is in no part", file=path, place="[[part]] channels")
+    _require_findable(tables, parts, path)
+    return parts
+
+
+def _require_findable(tables: RigFile, parts: Sequence[Part], path: Path | None) -> None:
+    """Parts whose files can be told, and whose offsets are stated or to be found, not both."""
+    for i, (part, table) in enumerate(zip(parts, tables.part, strict=True), 1):
+        where = f"[[part]] {i}"
+        if part.file.count(NAME) > 1 or (NAME in part.file) != (NAME in parts[0].file):
+            expected = f"{NAME} once in each of them, or in none"
+            raise ConfigurationError("a pattern of its own", file=path, place=where, found=part.file, expected=expected)
+        if part.correlate and (i == 1 or table.offset_s is not None or table.offset_u_s is not None):
+            expected = "align or offset_s, in a part that is not the first"
+            raise ConfigurationError("nothing to find", file=path, place=f"{where} align", expected=expected)
 
 
 def _points(tables: RigFile, length: float, path: Path | None) -> tuple[Point, ...]:

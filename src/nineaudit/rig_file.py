@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails
 from nineaudit.errors import ConfigurationError
 from nineaudit.presets import nearest
 from nineaudit.rig_schema import (
+    PartTable,
     PointTable,
     RecordingTable,
     RigFile,
@@ -30,8 +31,9 @@ _TABLES: Mapping[str, type[BaseModel]] = {
     "uncertainty": UncertaintyTable,
     "sensor": SensorTable,
     "point": PointTable,
+    "part": PartTable,
 }
-_ARRAYS = ("sensor", "point")
+_ARRAYS = ("sensor", "point", "part")
 _EXPECTED = {
     "string_pattern_mismatch": "text without blanks at its ends",
     "string_too_short": "some text",
@@ -176,4 +178,4 @@ def _place(loc: tuple[int | str, ...], document: Mapping[str, Any]) -> str:
 
 
 def _name(entry: object) -> object:
-    return entry.get("channel", entry.get("name")) if isinstance(entry, Mapping) else None
+    return entry.get("channel", entry.get("name", entry.get("file"))) if isinstance(entry, Mapping) else None

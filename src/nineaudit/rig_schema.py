@@ -224,6 +224,25 @@ class PointTable(Table):
     """Position in the body frame, in the length unit."""
 
 
+class PartTable(Table):
+    """One file of a recording that has several, each with a clock of its own."""
+
+    file: Text
+    """Pattern of its name, such as {name}_acc.csv; what stands for {name} is the same in all files of a recording."""
+    channels: Annotated[list[Text], Field(min_length=1)]
+    """Channels that are in this file. Each channel of the rig is in one part."""
+    time: Text | None = None
+    """The time column of this file. Default: that of [recording]."""
+    time_unit: TimeUnit | None = None
+    """Unit of the time column of this file. Default: that of [recording]."""
+    offset_s: float | None = None
+    """Seconds to add to its time stamps. Default: 0, the stamps are taken at their word."""
+    offset_u_s: Deviation | None = None
+    """Standard uncertainty of its clock against that of the first part, in s. Default: 0."""
+    align: Literal["stamps", "correlation"] = "stamps"
+    """Either stamps, or correlation: find the offset from readings of the same kind in the first part."""
+
+
 _SENSOR_NEEDS: dict[str, Any] = {
     "required": ["kind", "axis"],
     "if": {"properties": {"kind": {"const": "accelerometer"}}},
@@ -251,5 +270,7 @@ class RigFile(Table):
     uncertainty: UncertaintyTable = UncertaintyTable()
     sensor: list[SensorTable] = []
     """The channels, in the order of the array."""
+    part: list[PartTable] = []
+    """The files of a recording, where it has several. The clock of the first is that of the recording."""
     point: list[PointTable] = []
     """Points of the body at which results are wanted besides the origin."""

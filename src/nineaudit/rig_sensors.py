@@ -65,8 +65,10 @@ def build_sensors(tables: RigFile, path: Path | None) -> tuple[Sensor, ...]:
             expected="[[sensor]] tables, or a preset in [rig]",
             advice="`nineaudit rig presets` lists the layouts",
         )
-    read = [(f"channel {e.table.channel}", e.table.signal or e.table.channel) for e in entries]
-    check_unique("signal", read, path)
+    file_of = {channel: i for i, part in enumerate(tables.part) for channel in part.channels}
+    for file in {file_of.get(e.table.channel) for e in entries}:
+        here = [e.table for e in entries if file_of.get(e.table.channel) == file]
+        check_unique("signal", [(f"channel {t.channel}", t.signal or t.channel) for t in here], path)
     return tuple(_sensor(entry, tables) for entry in entries)
 
 

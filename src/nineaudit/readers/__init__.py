@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from nineaudit.errors import RecordingError
+from nineaudit.parts import in_order, part_of
 from nineaudit.readers import mme_files
 from nineaudit.readers.assemble import assemble
 from nineaudit.readers.can_log import read_can
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.csv_table import read_text_table
+from nineaudit.readers.joined import join
 from nineaudit.readers.mcap_log import read_mcap
 from nineaudit.readers.mme import read_mme
 from nineaudit.readers.parquet_table import read_parquet
@@ -72,14 +74,31 @@ READERS: Final[Mapping[str, Reader]] = {
 """Reader of each suffix (lower case)."""
 
 
-def read(path: str | Path, rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recording:
+def read(path: str | Path | Sequence[str | Path], rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recording:
     """Read a recording of a rig: (n,) s and (n,k) SI readings on one time base, and the traces as recorded.
 
-    `dbc` takes the place of the rig's CAN databases. Raises RecordingError (exit code 3) for a file that cannot be
-    read, is truncated, or lacks a channel; ConfigurationError (2) for databases and units.
+    Of a recording of several files (the rig's parts) `path` is any one of them, or all in a list. `dbc` takes the place
+    of the rig's CAN databases. Raises RecordingError (exit code 3) for a file that cannot be read, is truncated, or
+    lacks a channel; ConfigurationError (2) for databases, units and parts.
     """
-    path = Path(path)
     rig = replace(rig, dbc=tuple(Path(p) for p in dbc)) if dbc else rig
+    paths = rig.files(Path(path)) if isinstance(path, (str, Path)) else _each(path, rig)
+    if len(paths) == 1 and part_of(paths[0], rig.parts) is None:
+        rig = rig.in_one_file()
+        contents, source = _read_file(paths[0], rig)
+        return assemble(contents, rig, source)
+    joined = join(paths, rig, _read_file)
+    return assemble(joined.contents, rig, joined.source, joined.u_clock)
+
+
+def _each(paths: Sequence[str | Path], rig: Rig) -> tuple[Path, ...]:
+    """The files of one recording in the order of the rig's parts."""
+    named = [Path(path) for path in paths]
+    return tuple(named) if len(named) == 1 and not rig.parts else in_order(named, rig.parts, rig.path)
+
+
+def _read_file(path: Path, rig: Rig) -> tuple[Contents, Source]:
+    """What one file holds of a rig's channels, and which file that is."""
     reader = _reader(path)
     try:
         size, sha256 = fingerprint(path)
@@ -98,7 +117,7 @@ def read(path: str | Path, rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recor
         notes=contents.notes,
         damage=contents.damage,
     )
-    return assemble(contents, rig, source)
+    return contents, source
 
 
 def _reader(path: Path) -> Reader:

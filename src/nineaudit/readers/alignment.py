@@ -26,7 +26,7 @@ from nineaudit.recording import Alignment, Clock, Trace
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
 
-NOMINAL: Final = 0.005
+NOMINAL: Final = 0.01
 """Of a ratio of rates: what clocks of a nominal ratio may differ from it (crystals less, RC oscillators more)."""
 SLIDES: Final = 0.25
 """Of an interval: where the time between two clocks' samples changes by more, there is no skew between them."""

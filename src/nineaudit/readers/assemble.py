@@ -33,7 +33,8 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     of the trace with most samples, onto which the others are interpolated (resample.py), valid only between samples no
     further apart than a gap. What their clocks leave open about their time is added to the timing uncertainty of the
     recording's rig (alignment.py). Samples whose stamp is not above all earlier ones are not used, but counted.
-    `u_parts`: standard uncertainty, s, of the clock of each channel whose file is one part of the recording.
+    `u_parts`: standard uncertainty, s, of the clock of each channel, where each is in a part of the recording; the time
+    base is then that during which all parts were recording.
     Raises RecordingError: too few samples, or no time that the traces have in common; ConfigurationError: a unit.
     """
     by_channel = {trace.channel: trace for trace in contents.traces}
@@ -44,17 +45,18 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     clocks = tuple(clock_of(trace.time, used) for trace, used in zip(traces, usable, strict=True))
     native = tuple(_only(trace, used) for trace, used in zip(traces, usable, strict=True))
     base = max(range(len(native)), key=lambda i: native[i].time.size)
-    _require_samples(native[base], source)
-    columns, alignments = _on_one_base(native, clocks, base, source, u_parts or {})
+    _require_samples(native[base].time, source)
+    time, cut = _common(native, base, source) if u_parts else (native[base].time, ())
+    columns, alignments = _on_one_base(time, native, clocks, base, source, u_parts or {})
     readings = frozen(np.column_stack(columns))
     said = alignment.notes(alignments, native[base].channel, clocks[base].rate, _si_units(rig))
     stated = _stated_units(contents.traces, rig)
     return Recording(
-        time=native[base].time,
+        time=time,
         readings=readings,
         valid=_read_only(np.isfinite(readings)),
         rig=alignment.with_timing(rig, alignments),
-        source=replace(source, notes=(*source.notes, *notes, *said, *stated)),
+        source=replace(source, notes=(*source.notes, *notes, *cut, *said, *stated)),
         native=native,
         clocks=clocks,
         resampled=tuple(a.channel for a in alignments),
@@ -62,18 +64,36 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     )
 
 
+def _common(native: Sequence[Trace], base: int, source: Source) -> tuple[FloatArray, tuple[str, ...]]:
+    """The stamps of `native[base]` while every part was recording, and a note on those that are left out."""
+    time = native[base].time
+    for trace in native:
+        _require_overlap(time, trace, source)
+    start, end = max(float(t.time[0]) for t in native), min(float(t.time[-1]) for t in native)
+    first, last = int(np.searchsorted(time, start)), int(np.searchsorted(time, end, side="right"))
+    _require_samples(time[first:last], source)
+    if last - first == time.size:
+        return time, ()
+    text = f"{first} samples at the start and {time.size - last} at the end are left out: not every part was recording"
+    return frozen(time[first:last]), (f"{native[base].channel}: {text}",)
+
+
 def _on_one_base(
-    native: Sequence[Trace], clocks: Sequence[Clock], base: int, source: Source, u_parts: Mapping[str, float]
+    time: FloatArray,
+    native: Sequence[Trace],
+    clocks: Sequence[Clock],
+    base: int,
+    source: Source,
+    u_parts: Mapping[str, float],
 ) -> tuple[list[FloatArray], tuple[Alignment, ...]]:
-    """The readings of every trace at the stamps of `native[base]`, and how those came there that have other stamps."""
-    time, rate = native[base].time, clocks[base].rate
+    """The readings of every trace at `time`, stamps of `native[base]`, and how those came there that have others."""
     columns, alignments = [], []
     for trace, clock in zip(native, clocks, strict=True):
-        if np.array_equal(trace.time, time):
-            columns.append(trace.values)
+        if np.array_equal(trace.time, native[base].time):
+            columns.append(trace.values[np.searchsorted(trace.time, time)])
             continue
         _require_overlap(time, trace, source)
-        values, error = resample(time, trace, clock, rate)
+        values, error = resample(time, trace, clock, clocks[base].rate)
         columns.append(values)
         u_part = u_parts.get(trace.channel)
         alignments.append(alignment.align(trace, clock, native[base], clocks[base], error, u_part))
@@ -106,12 +126,12 @@ def _only(trace: Trace, used: BoolArray) -> Trace:
     return replace(trace, time=frozen(trace.time[used]), values=frozen(trace.values[used]))
 
 
-def _require_samples(base: Trace, source: Source) -> None:
-    if base.time.size < LEAST_SAMPLES:
+def _require_samples(time: FloatArray, source: Source) -> None:
+    if time.size < LEAST_SAMPLES:
         raise RecordingError(
             "too few samples",
             file=source.path,
-            found=f"{base.time.size} with a time stamp of their own",
+            found=f"{time.size} with a time stamp of their own",
             expected=f"{LEAST_SAMPLES} or more",
         )
 

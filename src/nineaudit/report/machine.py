@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nineaudit.auditing import Audit
     from nineaudit.diagnose import Diagnosis
     from nineaudit.errors import NineauditError
-    from nineaudit.recording import Recording
+    from nineaudit.recording import Recording, Source
     from nineaudit.rig import Rig
 
 SCHEMA = "nineaudit/result/1"
@@ -88,6 +88,17 @@ def _recording(recording: Recording) -> dict[str, Any]:
         "samples": len(time),
         "duration_s": instant(span),
         "rate_hz": plain(recording.rate) if len(time) > 1 else None,
+        "unchanged_after_read": source.unchanged_after_read,
+    } | ({"parts": [_file(part) for part in source.parts]} if source.parts else {})
+
+
+def _file(source: Source) -> dict[str, Any]:
+    """One file of a recording that has several."""
+    return {
+        "path": source.path.as_posix(),
+        "sha256": source.sha256,
+        "bytes": source.size,
+        "format": source.format,
         "unchanged_after_read": source.unchanged_after_read,
     }
 

@@ -9,6 +9,7 @@ from nineaudit.report.numbers import quantity, seconds
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
+    from nineaudit.recording import Source
 
 _PACKAGES = {"version": "nineaudit", "python": "Python"}
 
@@ -32,7 +33,8 @@ def identity(audit: Audit) -> list[tuple[str, str]]:
 
 def number(audit: Audit) -> str:
     """The same for the same recording, rig, rules and versions, and for nothing else."""
-    rests_on = (audit.recording.source.sha256, audit.recording.rig.sha256, audit.rulebook.sha256)
+    files = (source.sha256 for source in audit.recording.source.files)
+    rests_on = (*files, audit.recording.rig.sha256, audit.rulebook.sha256)
     text = " ".join((*rests_on, *(f"{name}={version}" for name, version in sorted(audit.tool.items()))))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()[:12]
 
@@ -42,13 +44,19 @@ def provenance(audit: Audit) -> list[tuple[str, str, bool]]:
     source, rig = audit.recording.source, audit.recording.rig
     altered = "no: same bytes before and after reading" if source.unchanged_after_read else "CHANGED while it was read"
     return [
-        ("Recording", source.path.as_posix(), True),
-        ("Bytes", f"{source.size}", False),
-        ("SHA-256 of the recording", source.sha256, True),
+        *(row for file in source.files for row in _file(file)),
         ("Original altered", altered, False),
         *((f"Reader's note {i}", note, False) for i, note in enumerate(source.notes, 1)),
         ("Rig file", rig.path.as_posix() if rig.path else "given as text", True),
         ("SHA-256 of the rig file", rig.sha256, True),
         ("SHA-256 of the rules", audit.rulebook.sha256, True),
         *((_PACKAGES.get(name, name), version, False) for name, version in audit.tool.items()),
+    ]
+
+
+def _file(source: Source) -> list[tuple[str, str, bool]]:
+    return [
+        ("Recording", source.path.as_posix(), True),
+        ("Bytes", f"{source.size}", False),
+        ("SHA-256 of the recording", source.sha256, True),
     ]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -70,7 +70,8 @@ def write_recording(
     """
     path = Path(path)
     writer = _writer(path)
-    _require_free(path, recording.source.path, force)
+    _require_free(path, [source.path for source in recording.source.files], force)
+    recording = replace(recording, rig=recording.rig.in_one_file())
     values = recording.readings if readings is None else np.asarray(readings, dtype=np.float64)
     if values.shape != recording.readings.shape:
         raise ValueError(f"readings {values.shape} for a recording of {recording.readings.shape}")
@@ -99,12 +100,12 @@ def _writer(path: Path) -> Writer:
     return WRITERS[suffix]
 
 
-def _require_free(path: Path, source: Path, force: bool) -> None:
+def _require_free(path: Path, sources: Sequence[Path], force: bool) -> None:
     if path.is_dir() or not path.parent.is_dir():
         what = "is a folder" if path.is_dir() else "the folder for it does not exist"
         raise ConfigurationError(what, file=path, expected="a file in a folder that exists")
-    same = source.exists() and path.exists() and path.samefile(source)
-    if same or path.absolute() == source.absolute():
+    same = path.exists() and any(source.exists() and path.samefile(source) for source in sources)
+    if same or path.absolute() in [source.absolute() for source in sources]:
         raise ConfigurationError(
             "the original recording is never overwritten", file=path, advice="choose another name for the output"
         )
