@@ -1,4 +1,4 @@
-"""Fields of a decoded message by path: linear_acceleration.x, samples.0.value. JSON values and ROS messages alike."""
+"""Fields of a decoded JSON message by path: linear_acceleration.x, samples.0.value."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 MISSING: Final = object()
+_DEEPEST: Final = 32
 
 
 def lookup(message: Any, path: str) -> Any:
@@ -20,28 +21,15 @@ def lookup(message: Any, path: str) -> Any:
 def _step(message: Any, name: str) -> Any:
     if isinstance(message, Mapping):
         return message.get(name, MISSING)
-    if isinstance(message, Sequence) and not isinstance(message, (str, bytes)):
+    if isinstance(message, Sequence) and not isinstance(message, str):
         return message[int(name)] if name.isdecimal() and int(name) < len(message) else MISSING
-    return getattr(message, name, MISSING) if name in _names(message) else MISSING
+    return MISSING
 
 
-def _names(message: Any) -> Sequence[str]:
-    """Fields of a ROS message: the decoder keeps them in slots."""
-    return tuple(getattr(type(message), "__slots__", ())) or tuple(getattr(message, "__dict__", ()))
-
-
-def leaves(message: Any, prefix: str = "") -> Iterator[str]:
-    """Paths of the numbers in a message."""
-    if isinstance(message, bool) or message is None or isinstance(message, (str, bytes)):
-        return
-    if isinstance(message, (int, float)):
+def leaves(message: Any, prefix: str = "", depth: int = 0) -> Iterator[str]:
+    """Paths of the numbers in a message, those of more than 32 names left out."""
+    if isinstance(message, (int, float)) and not isinstance(message, bool):
         yield prefix
-        return
-    if isinstance(message, Mapping):
-        names: Sequence[str] = tuple(message)
-    elif isinstance(message, Sequence):
-        names = tuple(map(str, range(len(message))))
-    else:
-        names = _names(message)
-    for name in names:
-        yield from leaves(_step(message, name), f"{prefix}.{name}" if prefix else name)
+    names = message if isinstance(message, Mapping) else range(len(message)) if isinstance(message, list) else ()
+    for name in map(str, names) if depth < _DEEPEST else ():
+        yield from leaves(_step(message, name), f"{prefix}.{name}" if prefix else name, depth + 1)

@@ -54,12 +54,13 @@ class Undecodable(Exception):
     """Why the messages of a channel cannot be decoded at all; never leaves the MCAP reader."""
 
 
-def numbers(found: Sequence[Any]) -> Column:
-    """A column of Python values: those that are finite numbers. Integers stay integers where all are."""
+def numbers(found: Sequence[Any], dtype: str | None = None) -> Column:
+    """A column of Python values: those that are finite numbers. Without a `dtype` integers stay integers where all
+    are."""
     there = np.array([is_number(v) for v in found], dtype=bool)
     values = [v if ok else 0 for v, ok in zip(found, there.tolist(), strict=True)]
     whole = all(isinstance(v, int) and -(2**63) <= v < 2**63 for v in values)
-    return Column(np.array(values, dtype=np.int64 if whole else np.float64), there)
+    return Column(np.array(values, dtype=dtype or (np.int64 if whole else np.float64)), there)
 
 
 def is_number(value: Any) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -30,7 +30,7 @@ class Json:
 
     def leaves(self, batch: Batch) -> list[str]:
         """Paths of the numbers of the first message that can be decoded."""
-        return list(leaves(_first(batch)))
+        return list(islice(leaves(_first(batch)), 1000))
 
     def read(self, batch: Batch, paths: Sequence[str]) -> Decoded:
         """The numbers at paths. A message that is not JSON is not good."""

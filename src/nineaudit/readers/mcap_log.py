@@ -18,7 +18,8 @@ from nineaudit.array import FloatArray, frozen
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.mcap_book import Book
-from nineaudit.readers.mcap_parse import MAGIC, Int64
+from nineaudit.readers.mcap_columns import Column
+from nineaudit.readers.mcap_parse import MAGIC
 from nineaudit.readers.mcap_records import batches
 from nineaudit.readers.mcap_topics import Stream, Topics, unreadable
 from nineaudit.recording import Trace
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
 _EPOCH_NS: Final = 10**15
 """1e6 s: larger times are dates, and lose digits as floating-point seconds."""
-_NS: Final = {"s": 10**9, "ms": 10**6, "us": 10**3, "µs": 10**3, "ns": 1}
 
 
 def read_mcap(path: Path, rig: Rig) -> Contents:
@@ -132,47 +132,49 @@ def _values(streams: Sequence[Stream], name: str) -> FloatArray:
 
 def _clocks(used: dict[str, list[Stream]], rig: Rig, origin: int) -> tuple[dict[str, FloatArray], tuple[str, ...]]:
     """(m,) s of each topic's messages. Dates count from the earliest of them, which the note says."""
-    stamps = {topic: _in_order(streams, [_stamps(s, rig, origin) for s in streams]) for topic, streams in used.items()}
-    dates = {topic: _first(stamp) for topic, stamp in stamps.items() if _first(stamp) > _EPOCH_NS}
-    base = int(min(dates.values(), default=0))
+    stamps = {topic: _topic_stamps(streams, rig, origin) for topic, streams in used.items()}
+    dates = {topic: _first_ns(stamp) for topic, stamp in stamps.items() if _first_ns(stamp) > _EPOCH_NS}
+    base = min(dates.values(), default=0)
     clocks = {topic: frozen(_seconds(stamp, base if topic in dates else 0)) for topic, stamp in stamps.items()}
     return clocks, (f"time counts from log time {base} ns",) if base else ()
 
 
-def _stamps(stream: Stream, rig: Rig, origin: int) -> Int64 | FloatArray:
+def _topic_stamps(streams: Sequence[Stream], rig: Rig, origin: int) -> Column:
+    columns = [_stamps(s, rig, origin) for s in streams]
+    return Column(*(_in_order(streams, [c[k] for c in columns]) for k in range(2)))
+
+
+def _stamps(stream: Stream, rig: Rig, origin: int) -> Column:
     """(m,) times of a channel's messages: int64 ns, or float64 s where its time signal is no integer."""
     if not stream.stamp:
-        return np.concatenate(stream.times) + origin
+        times = np.concatenate(stream.times) + origin
+        return Column(times, np.ones(len(times), dtype=bool))
     columns = [stream.column(name) for name in stream.stamp]
     there = np.logical_and.reduce([c.there for c in columns])
-    whole = all(c.values.dtype.kind in "iu" for c in columns)
-    unit = time_unit(stream.stamp[0], rig.time_unit) or "s"
-    if len(columns) == 2 and whole:
-        return _or_none(columns[0].values.astype(np.int64) * 10**9 + columns[1].values.astype(np.int64), there)
-    if whole and unit in _NS and not (np.abs(columns[0].floats()) * _NS[unit] > 2**62).any():
-        return _or_none(columns[0].values.astype(np.int64) * _NS[unit], there)
-    seconds = [c.floats() * scale for c, scale in zip(columns, (factor(unit, "time"), 1e-9), strict=False)]
-    return np.asarray(np.sum(seconds, axis=0))
+    unit = "s" if len(columns) == 2 else time_unit(stream.stamp[0], rig.time_unit) or "s"
+    scales = (round(factor(unit, "time") * 1e9), 1)[: len(columns)]
+    parts = list(zip(columns, scales, strict=True))
+    if all(_counts_ns(c, scale) for c, scale in parts):
+        return Column(np.add.reduce([c.values.astype(np.int64) * scale for c, scale in parts]), there)
+    return Column(np.add.reduce([c.floats() * (scale / 1e9) for c, scale in parts]), there)
 
 
-def _or_none(stamps: Int64, there: Any) -> Int64 | FloatArray:
-    """Times in ns; where some messages have none, in s with NaN there."""
-    if there.all():
-        return stamps
-    return np.where(there, stamps * 1e-9, np.nan)
+def _counts_ns(column: Column, scale: int) -> bool:
+    """Whether a column is of integers that stay exact in ns."""
+    return column.values.dtype.kind in "iu" and bool(np.nanmax(np.abs(column.floats()), initial=0) * scale < 2**62)
 
 
-def _first(stamps: Any) -> float:
-    """The earliest time in ns."""
-    if stamps.dtype.kind == "i":
-        return int(stamps.min(initial=2**62))
-    return float(np.nanmin(stamps)) * 1e9 if np.isfinite(stamps).any() else 0.0
+def _first_ns(stamps: Column) -> int:
+    """The earliest time in ns, 0 where there is none."""
+    found = stamps.values[stamps.there]
+    return int(found.min(initial=2**62) * (1 if found.dtype.kind == "i" else 1e9)) if len(found) else 0
 
 
-def _seconds(stamps: Any, base: int) -> FloatArray:
-    if stamps.dtype.kind == "i":
-        return np.asarray((stamps - base) * 1e-9)
-    return np.asarray(stamps - base * 1e-9)
+def _seconds(stamps: Column, base: int) -> FloatArray:
+    whole = stamps.values.dtype.kind == "i"
+    seconds = np.asarray((stamps.values - base) * 1e-9 if whole else stamps.values - base * 1e-9)
+    seconds[~stamps.there] = np.nan
+    return seconds
 
 
 def _counts(book: Book, topics: Topics, used: dict[str, list[Stream]]) -> dict[str, float]:

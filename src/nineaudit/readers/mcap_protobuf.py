@@ -86,13 +86,12 @@ class Protobuf:
         places = [_field_path(self.kind.DESCRIPTOR, path) for path in paths]
         if any(_intricate(place) for place in places if place):
             return Decoded(*_by_library(self.kind, batch, np.arange(len(batch)), places))
-        types = [_SCALARS[place[-1][0].type].dtype if place else "f8" for place in places]
-        found = walked(batch, _wants(places), types)
+        found = walked(batch, _wants(places), [_dtype(place) for place in places])
         odd = np.flatnonzero(found.odd)
         if len(odd):
             columns, found.good[odd] = _by_library(self.kind, batch, odd, places)
             for ours, theirs in zip(found.columns, columns, strict=True):
-                ours.values[odd], ours.there[odd] = theirs.values.astype(ours.values.dtype), theirs.there
+                ours.values[odd], ours.there[odd] = theirs.values, theirs.there
         return Decoded(found.columns, found.good)
 
 
@@ -111,6 +110,10 @@ def _field_path(kind: Descriptor, path: str) -> Place | None:
         place.append((found, int(names.pop(0)) if found.is_repeated else 0))
         kind = found.message_type
     return place if place and place[-1][0].type in _SCALARS else None
+
+
+def _dtype(place: Place | None) -> str:
+    return _SCALARS[place[-1][0].type].dtype if place else "f8"
 
 
 def _intricate(place: Place) -> bool:
@@ -160,7 +163,7 @@ def _by_library(
             messages.append(kind.FromString(bytes(batch.data[start:end])))
         except DecodeError:
             messages.append(None)
-    columns = (numbers([_value(m, place) for m in messages]) for place in places)
+    columns = (numbers([_value(m, place) for m in messages], _dtype(place)) for place in places)
     return tuple(columns), np.array([m is not None for m in messages], dtype=bool)
 
 

@@ -57,6 +57,7 @@ _BOTH: Final = {
 _ROS1: Final = _BOTH | {"char": "u1", "byte": "i1"}
 _ROS2: Final = _BOTH | {"char": "u1", "byte": "u1"}
 _DEEPEST: Final = 64
+_LARGEST: Final = 2**31
 _FIELD = re.compile(r"^([\w/]+)(?:<=(\d+))?(\[(?:<=)?\d*\])?\s+([A-Za-z]\w*)\s*(.*)$")
 _BUILT_IN: Final = {
     "ros1": {
@@ -118,7 +119,10 @@ class _Builder:
         item = self.item(name, package, depth)
         if array is None:
             return item
-        return Array(item, int(array[1:-1]) if array[1:-1].isdecimal() else None)
+        count = int(array[1:-1]) if array[1:-1].isdecimal() else None
+        if count is not None and count > _LARGEST:
+            raise Undecodable("an array of more items than can be")
+        return Array(item, count)
 
     def item(self, name: str, package: str, depth: int) -> Type:
         if name in self.numbers:

@@ -214,6 +214,8 @@ _NONE: Final = np.zeros(0, dtype=np.int64)
 
 def _signed(values: Numbers, scalar: Scalar) -> Numbers:
     """Varints as the numbers that they stand for."""
+    kind = np.dtype(f"u{scalar.size}").type
+    values = values.astype(kind)
     if scalar.zigzag:
-        values = (values >> np.uint64(1)) ^ (np.uint64(0) - (values & np.uint64(1)))
-    return values.astype(f"u{scalar.size}").view(scalar.dtype)
+        values = (values >> kind(1)) ^ (kind(0) - (values & kind(1)))
+    return values.view(scalar.dtype)
