@@ -72,8 +72,8 @@ def _on_the_way(budget: Budget) -> Iterator[str]:
 
 def _on_filters(budget: Budget) -> Iterator[str]:
     beyond = budget.beyond
-    if not beyond.rounding.any():
-        yield "quantisation: nothing to count, neither rig (resolution) nor recording shows a step"
+    if not _counts(budget, "quantisation"):
+        yield "quantisation: nothing to count, neither rig (resolution) nor recording shows a step that matters"
     if not beyond.mismatch.any():
         yield "filters: nothing to count, all channels are behind the same"
     else:
@@ -138,8 +138,13 @@ def quantity(line: Line) -> str:
 
 
 def _shown(budget: Budget) -> tuple[str, ...]:
-    present = {"quantisation": budget.beyond.rounding.any(), "filters": budget.beyond.mismatch.any()}
-    return tuple(source for source in ROWS if source not in _OPTIONAL or present[source])
+    return tuple(source for source in ROWS if source not in _OPTIONAL or _counts(budget, source))
+
+
+def _counts(budget: Budget, source: str) -> bool:
+    """Whether a source adds to any output."""
+    found = [rows for line in budget.lines for rows in (line.at_their_word, line.fit) if rows is not None]
+    return any(rows[source] >= NEGLIGIBLE * total(rows) for rows in found if total(rows) > 0.0)
 
 
 def _cells(rows: Rows, shown: Sequence[str]) -> tuple[str, ...]:
