@@ -104,7 +104,7 @@ def test_the_note_tells_what_is_stated_from_what_is_seen() -> None:
 
 
 def test_nothing_but_the_guard_filters_a_recording() -> None:
-    """`filters.cfc` is the bare filter: of the simulator and the published numbers, of what a mismatch of classes does to
+    """`filters.cfc` is the bare filter: of the simulator and the published numbers, of what a mismatch does to
     readings that a motion predicts, and of the guard `filters.once`."""
     bare = []
     for path in SOURCES.rglob("*.py"):
