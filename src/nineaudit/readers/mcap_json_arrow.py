@@ -19,6 +19,9 @@ Step = tuple[type, str | int]
 _LOOKED_AT: Final = 8
 """Messages that are looked at for one that has every number."""
 
+_EXACT: Final = 2.0**53
+"""Integers below are floating-point numbers too."""
+
 
 def by_arrow(texts: Sequence[bytes], paths: Sequence[str]) -> tuple[Column, ...] | None:
     """Columns of the numbers at paths; None where Arrow refuses a text, or a path could mean two things.
@@ -37,7 +40,10 @@ def by_arrow(texts: Sequence[bytes], paths: Sequence[str]) -> tuple[Column, ...]
         table = _parsed(joined, routes, whole=False)
     if table is None or table.num_rows != len(texts):
         return None
-    return tuple(_column(table, steps) for steps, _ in routes)
+    columns = [_column(table, steps) for steps, _ in routes]
+    whole = [_whole(column) if integer else column for column, (_, integer) in zip(columns, routes, strict=True)]
+    exact = tuple(column for column in whole if column is not None)
+    return exact if len(exact) == len(routes) else None
 
 
 def _routes(text: bytes, paths: Sequence[str]) -> list[tuple[list[Step], bool]] | None:
@@ -131,6 +137,17 @@ def _column(table: pa.Table, steps: Sequence[Step]) -> Column:
     there = place.is_valid().to_numpy(zero_copy_only=False)
     values = place.fill_null(0).to_numpy(zero_copy_only=False)
     return Column(values, there & np.isfinite(values))
+
+
+def _whole(column: Column) -> Column | None:
+    """A column of which one number is an integer: as integers where all are; None where some of them have more digits
+    than the floating-point numbers that they were read as."""
+    if column.values.dtype.kind == "i":
+        return column
+    if (np.abs(column.values[column.there]) >= _EXACT).any():
+        return None
+    whole = np.where(column.there, column.values, 0).astype(np.int64)
+    return Column(whole, column.there) if (whole == column.values)[column.there].all() else column
 
 
 def _item(lists: pa.ListArray, item: int) -> pa.Array:
