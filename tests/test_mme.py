@@ -6,6 +6,7 @@ import random
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
@@ -266,9 +267,35 @@ def test_a_member_of_an_archive_that_is_damaged(tmp_path: Path) -> None:
     same(found, np.where(P == 3.5, 7.5, P))
     assert found.damage[0].place == "Channel/T1.001"
     assert "its checksum (CRC-32) is wrong" in found.damage[0].what
-    path.write_bytes(data[:-40])
-    with pytest.raises(RecordingError, match="cut short or damaged: its directory cannot be read"):
+
+
+@pytest.mark.parametrize("streamed", [False, True])
+def test_an_archive_that_is_cut(tmp_path: Path, streamed: bool) -> None:
+    """Its directory, at the end, is lost: the files are found by the headers before them."""
+    path = archive(tmp_path, files())
+    if streamed:  # sizes and checksums behind the data, as writers to a pipe have them
+        with path.open("wb") as raw, zipfile.ZipFile(_Pipe(raw), "w", zipfile.ZIP_DEFLATED) as out:
+            for name, text in files().items():
+                out.writestr(name, text.encode("cp1252"))
+    data = path.read_bytes()
+    path.write_bytes(data[: data.index(b"PK\x01\x02") + 9])
+    found = read_mme(path, rig())
+    same(found)
+    assert len(found.damage) == 1
+    assert found.damage[0].what.startswith("the directory of the archive cannot be read")
+    path.write_bytes(data[: data.rindex(b"PK\x03\x04") + 250])
+    found = read_mme(path, rig(CODES[0], "lab X"))
+    same(found, P, P)
+    path.write_bytes(data[:20])
+    with pytest.raises(RecordingError, match="cut short or damaged: the directory of the archive cannot be read"):
         read(path, rig())
+
+
+class _Pipe:
+    """A file that cannot be wound back."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self.write, self.flush = file.write, file.flush
 
 
 def test_a_bomb_is_read_to_its_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,12 @@ def read_mme(path: Path, rig: Rig) -> Contents:
         "samples": sum(r.values.size for r in read.values()),
         "invalid_samples": sum(r.missing for r in read.values()),
     }
-    return Contents(traces, counts, tuple(_notes(found, rig)), (*damage, *(d for r in read.values() for d in r.damage)))
+    return Contents(
+        traces,
+        counts,
+        tuple(_notes(found, rig)),
+        (*test.store.damage, *damage, *(d for r in read.values() for d in r.damage)),
+    )
 
 
 def _indexed(test: Test, heads: list[Channel]) -> tuple[list[Channel], list[Damage]]:

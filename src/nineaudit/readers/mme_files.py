@@ -7,11 +7,12 @@ Nothing is unpacked to disk; of no member are more than `LARGEST` bytes read, wh
 from __future__ import annotations
 
 import hashlib
+import mmap
 import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, Final
@@ -37,6 +38,7 @@ class Store:
 
     names: tuple[str, ...]
     read: Reader
+    damage: tuple[Damage, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +97,7 @@ def _folder(folder: Path) -> Store:
 
 
 def _archive(path: Path) -> Store:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            infos = {info.filename: info for info in archive.infolist() if not info.is_dir()}
-    except _BROKEN as error:
-        raise cut_short(path, f"its directory cannot be read ({error})", "no file") from error
+    infos, damage = _directory(path)
 
     def read(name: str, most: int) -> tuple[bytes, tuple[Damage, ...]]:
         with path.open("rb") as file:
@@ -108,11 +106,45 @@ def _archive(path: Path) -> Store:
             return data, _too_large(name, most, infos[name].file_size)
         return data, (Damage(f"a file of the archive is damaged: {fault}", name, lost=f"{len(data)} bytes are read"),)
 
-    return Store(tuple(infos), read)
+    return Store(tuple(name for name in infos if name and not name.endswith("/")), read, damage)
 
 
-# PKWARE APPNOTE 4.3.7: local file header of 30 bytes, the last four the lengths of name and extra field after it.
-_LOCAL: Final = struct.Struct("<4s22xHH")
+def _directory(path: Path) -> tuple[dict[str, zipfile.ZipInfo], tuple[Damage, ...]]:
+    """The files of an archive by name; where its directory is cut off or damaged, those whose headers are found."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {info.filename: info for info in archive.infolist()}, ()
+    except _BROKEN as error:
+        infos = {info.filename: info for info in _salvaged(path)}
+        what = f"the directory of the archive cannot be read ({error})"
+        if not infos:
+            raise cut_short(path, what, "no file") from error
+    return infos, (Damage(what, path.name, lost=f"{len(infos)} files are found without it"),)
+
+
+# PKWARE APPNOTE 4.3.7, local file header: signature, version, flags, method, time, date, CRC-32, packed size, size,
+# lengths of the name and of the extra field, which follow; then the data.
+_LOCAL: Final = struct.Struct("<4s5H3L2H")
+_SIGNATURE: Final = b"PK\x03\x04"
+_UNSIZED: Final = 8
+"""Flag: sizes and checksum come behind the data."""
+_MOST: Final = 10_000
+
+
+def _salvaged(path: Path) -> Iterator[zipfile.ZipInfo]:
+    """The files of an archive by the headers before their data."""
+    if not path.stat().st_size:
+        return
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        at, count = data.find(_SIGNATURE), 0
+        while 0 <= at <= len(data) - _LOCAL.size and count < _MOST:
+            _, _, flags, method, _, _, crc, packed, size, length, _ = _LOCAL.unpack_from(data, at)
+            name = data[at + _LOCAL.size : at + _LOCAL.size + length].decode("utf-8", "replace")
+            info = zipfile.ZipInfo(name)
+            info.header_offset, info.flag_bits, info.compress_type, info.CRC = at, flags, method, crc
+            info.compress_size, info.file_size = (len(data), -1) if flags & _UNSIZED else (packed, size)
+            yield info
+            at, count = data.find(_SIGNATURE, at + _LOCAL.size), count + 1
 
 
 def _unpacked(file: BinaryIO, info: zipfile.ZipInfo, most: int) -> tuple[bytes, str]:
@@ -122,14 +154,14 @@ def _unpacked(file: BinaryIO, info: zipfile.ZipInfo, most: int) -> tuple[bytes, 
         return b"", "it is encrypted, or packed in another way than by deflate"
     file.seek(max(info.header_offset, 0))
     local = file.read(_LOCAL.size)
-    if len(local) < _LOCAL.size or not local.startswith(b"PK\x03\x04"):
+    if len(local) < _LOCAL.size or not local.startswith(_SIGNATURE):
         return b"", "its header is not where the directory says"
-    file.seek(sum(_LOCAL.unpack(local)[1:]), 1)
+    file.seek(sum(_LOCAL.unpack(local)[-2:]), 1)
     if info.compress_type == zipfile.ZIP_STORED:
         data, fault = file.read(min(info.compress_size, most)), ""
     else:
         data, fault = _inflated(file, info.compress_size, most)
-    if fault or len(data) == most:
+    if fault or len(data) == most or info.file_size < 0:
         return data, fault
     if len(data) != info.file_size:
         return data, f"{len(data)} bytes for the {info.file_size} stated"

@@ -181,7 +181,7 @@ def _rates(line: str) -> Iterator[float]:
     if kind is None:
         return
     in_key = re.search(r"[\[(]([a-zA-Zµ]+)[\])]", name)
-    for cell, after in zip(cells, [*cells[1:], ""], strict=True):
+    for cell, after in zip(cells, [*cells[1:], ""], strict=False):
         number = _VALUE.fullmatch(cell.strip("\"' "))
         unit = (number[2] if number else "") or (in_key[1] if in_key else "") or after.strip("\"' ")
         scale = _SCALE.get(unit.lower() if not is_number(unit or "0") else "")
