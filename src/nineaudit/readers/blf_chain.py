@@ -110,7 +110,8 @@ def _plausible(heads: Records) -> NDArray[np.bool_]:
     uniform = len(heads) and int(form.min()) == int(form.max())
     header, version = (heads[name][:1] if uniform else heads[name] for name in ("header", "version"))
     fits = (header >= BASE) & (header <= _LONGEST_HEADER) & (version - np.uint16(1) < 3)
-    return np.asarray(fits & (size >= header) & (size <= LARGEST))
+    room = size - header  # unsigned: where the object is less than its header this is very much
+    return np.asarray(fits & (room <= LARGEST))
 
 
 def _signatures(buffer: Bytes, n: int, phase: int) -> Places:

@@ -18,6 +18,8 @@ _DTYPES: Final = {"time": "i8", "key": "u4", "channel": "u2", "kind": "u1", "len
 _SMALL: Final = 1 << 17
 """Rows up to which a column grows by doubling, since then by a quarter."""
 
+_FEW: Final = 8
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -59,7 +61,8 @@ class Columns:
 
     def __init__(self, expected: int) -> None:
         self._columns = {name: _Column(expected, dtype) for name, dtype in _DTYPES.items()}
-        self._long_rows, self._long = _Column(0, np.intp), _Column(0, _WORD, LONG // 8)
+        self._long: tuple[_Column, _Column] | None = None
+        self._expected = expected
         self._present = np.zeros(1 << 16, dtype=np.bool_)
         self._part: Part | None = None
         self._begin = self._count = 0
@@ -79,26 +82,38 @@ class Columns:
         if len(some) > 1:
             order = np.argsort(rows, kind="stable")
             rows, words = rows[order], words[order]
-        np.add(rows, self._begin, out=self._long_rows.room(len(rows)))
-        self._long.room(len(rows))[:] = words
+        long_rows, long = self._long = self._long or self._columns_of_long(len(rows))
+        np.add(rows, self._begin, out=long_rows.room(len(rows)))
+        long.room(len(rows))[:] = words
+
+    def _columns_of_long(self, first: int) -> tuple[_Column, _Column]:
+        """With room for as many, of all frames expected, as the `first` are of those there are, and some more."""
+        expected = self._expected * first // max(self._count, 1) * 9 // 8
+        return _Column(expected, np.intp), _Column(expected, _WORD, LONG // 8)
 
     def _note_channels(self) -> None:
-        if self._part is not None:
-            self._present[self._part.channel] = True
-            self._part = None
+        if self._part is None or not len(self._part.channel):
+            return
+        channels, self._part = self._part.channel, None
+        low, high = int(channels.min()), int(channels.max())
+        if high - low < _FEW:  # which is much faster
+            self._present[[c for c in range(low, high + 1) if (channels == c).any()]] = True
+        else:
+            self._present[channels] = True
 
     def frames(self, **rest: Any) -> Frames:
         """All of them, once; `rest` are the fields of the whole log."""
         self._note_channels()
         columns = {name: column.array() for name, column in self._columns.items()}
+        long_rows, long = self._long or self._columns_of_long(0)
         present = np.flatnonzero(self._present)
         codes = (np.cumsum(self._present) - 1).astype(np.uint16)
         return Frames(
             bus=codes[columns.pop("channel")],
             buses=tuple(map(str, present.tolist())),
             data=columns.pop("data").view(np.uint8).reshape(-1, SHORT),
-            long_rows=self._long_rows.array(),
-            long=self._long.array().view(np.uint8).reshape(-1, LONG),
+            long_rows=long_rows.array(),
+            long=long.array().view(np.uint8).reshape(-1, LONG),
             **columns,
             **rest,
         )

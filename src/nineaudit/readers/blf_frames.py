@@ -19,6 +19,7 @@ from nineaudit.readers.losses import Losses
 from nineaudit.signals import can_origin
 
 Codes = NDArray[np.uint8]
+Sizes = NDArray[np.int64]
 
 _TENS, _NANOSECONDS = 1, 2
 _TEN_MICROSECONDS: Final = 10_000
@@ -26,7 +27,7 @@ _MARKER: Final = 96
 BEYOND: Final = 255
 """Code that stands for all types from 255 on, of which none is a CAN frame."""
 UNKNOWN_UNIT: Final = "frames stamped in a unit that is not known, read as ns"
-_LEAST: Final = np.array([TYPES[t].least if t in TYPES else 0 for t in range(BEYOND + 1)], dtype=np.uint32)
+_LEAST: Final = np.array([TYPES[t].least if t in TYPES else 0 for t in range(BEYOND + 1)], dtype=np.int64)
 
 
 @dataclass
@@ -44,28 +45,31 @@ class Account:
 def add_frames(columns: Columns, batch: Batch, account: Account) -> None:
     """Put the frames of a batch of objects behind those there are, in order."""
     codes = np.minimum(batch.heads["type"], np.uint32(BEYOND)).astype(np.uint8)
-    seen = np.zeros(BEYOND + 1, dtype=np.bool_)
-    seen[codes] = True
-    present = np.flatnonzero(seen).tolist()
-    _take_stock(batch, codes, present, account)
-    keep = _keep(batch, codes, account)
+    present = _counted(codes)
+    account.types.update(present)
+    if _MARKER in present and not account.origin:
+        account.origin = _origin(batch, np.flatnonzero(codes == _MARKER))
+    room = batch.heads["size"].astype(np.int64) - batch.heads["header"]
+    keep = _keep(batch, codes, room, account)
     if keep is not None:
-        codes, batch = codes[keep], replace(batch, at=batch.at[keep], heads=batch.heads[keep])
-    part, long = columns.room(len(codes)), []
+        batch = replace(batch, at=batch.at[keep], heads=batch.heads[keep])
+        codes, room = codes[keep], room[keep]
+    part = columns.room(len(codes))
     _put_time(part.time, batch.heads, account)
+    long: list[tuple[Rows, Words]] = []
     for code in present:
         if code in TYPES:
-            for group, found in _read(batch, codes, code, account):
-                long.append(_put(part, group, found))
-    columns.add_long([some for some in long if some is not None])
+            for rows, found in _read(batch, codes, room, code, account):
+                long += _put(part, rows, found)
+    columns.add_long(long)
 
 
-def _take_stock(batch: Batch, codes: Codes, present: list[int], account: Account) -> None:
-    for code in present:
-        here = codes == code
-        account.types[code] += int(np.count_nonzero(here))
-        if code == _MARKER and not account.origin:
-            account.origin = _origin(batch, np.flatnonzero(here))
+def _counted(codes: Codes) -> dict[int, int]:
+    """How many there are of each code: most logs hold few, which are looked for one by one."""
+    counts = {code: int(np.count_nonzero(codes == code)) for code in TYPES}
+    if sum(counts.values()) < len(codes):
+        counts = dict(enumerate(np.bincount(codes).tolist()))
+    return {code: count for code, count in counts.items() if count}
 
 
 def _origin(batch: Batch, rows: Rows) -> int:
@@ -77,13 +81,12 @@ def _origin(batch: Batch, rows: Rows) -> int:
     return 0
 
 
-def _keep(batch: Batch, codes: Codes, account: Account) -> NDArray[np.bool_] | None:
+def _keep(batch: Batch, codes: Codes, room: Sizes, account: Account) -> NDArray[np.bool_] | None:
     """(m,) true for the objects that are frames, and fit to be; None if all are."""
-    heads, least = batch.heads, _LEAST[codes]
-    header = heads["header"]
+    heads, least = batch.heads, _LEAST.take(codes)
     frames = least > 0
-    small = frames & (heads["size"] < header + least)
-    strange = frames & ((heads["version"] > 2) | (header < HEAD.itemsize))
+    small = frames & (room < least)
+    strange = frames & _strange(heads)
     late = frames & _late(heads, account.start)
     for what, fault in (
         ("a frame's object is smaller than its fields", small),
@@ -94,6 +97,14 @@ def _keep(batch: Batch, codes: Codes, account: Account) -> NDArray[np.bool_] | N
             _book(account, batch, what, fault, int(heads["size"][fault].sum()))
             frames &= ~fault
     return None if frames.all() else frames
+
+
+def _strange(heads: Records) -> Any:
+    """(m,) true where a header is not of a kind that frames have; False if there is none."""
+    form = heads["form"]
+    if len(heads) and form.min() == form.max():
+        heads = heads[:1]
+    return (heads["version"] > 2) | (heads["header"] < HEAD.itemsize)
 
 
 def _book(account: Account, batch: Batch, what: str, fault: NDArray[np.bool_], lost: int = 0) -> None:
@@ -120,36 +131,37 @@ def _put_time(time: NDArray[np.int64], heads: Records, account: Account) -> None
     time += account.start
 
 
-def _read(batch: Batch, codes: Codes, code: int, account: Account) -> Iterator[tuple[Rows, Found]]:
-    """Frames of one type, for each size of header that comes with it."""
+def _read(batch: Batch, codes: Codes, room: Sizes, code: int, account: Account) -> Iterator[tuple[Rows, Found]]:
+    """Frames of one type and their rows, for each size of header that comes with it."""
     rows = np.flatnonzero(codes == code)
-    headers = batch.heads["header"][rows]
+    headers = batch.heads["header"].take(rows)
     while len(rows):
-        header = int(headers[0])
         same = headers == headers[0]
         chosen = rows if same.all() else rows[same]
-        yield chosen, TYPES[code].read(_group(batch, chosen, header, code, account))
+        yield chosen, TYPES[code].read(_group(batch, chosen, room, int(headers[0]), code, account))
         rows, headers = rows[~same], headers[~same]
 
 
-def _group(batch: Batch, rows: Rows, header: int, code: int, account: Account) -> Group:
+def _group(batch: Batch, rows: Rows, room: Sizes, header: int, code: int, account: Account) -> Group:
+    at = batch.at.take(rows)
+
     def damaged(what: str, fault: NDArray[np.bool_]) -> None:
-        _book(account, replace(batch, at=batch.at[rows]), what, fault)
+        _book(account, replace(batch, at=at), what, fault)
 
     def odd(what: str, count: int) -> None:
         account.odd[what] += count
 
-    record = gather(batch.buffer, batch.at[rows] + header, TYPES[code].record)
-    return Group(record, batch.heads["size"][rows].astype(np.int64) - header, header, damaged, odd)
+    return Group(gather(batch.buffer, at + header, TYPES[code].record), room.take(rows), header, damaged, odd)
 
 
-def _put(part: Part, rows: Rows, found: Found) -> tuple[Rows, Words] | None:
+def _put(part: Part, rows: Rows, found: Found) -> list[tuple[Rows, Words]]:
     """Fill the rows of a part; rows and data of those frames that have more than eight bytes."""
-    part.key[rows], part.channel[rows] = found.key, found.channel
-    part.kind[rows], part.length[rows] = found.kind, found.length
+    where = slice(None) if len(rows) == len(part.time) else rows
+    part.key[where], part.channel[where] = found.key, found.channel
+    part.kind[where], part.length[where] = found.kind, found.length
     if found.data.ndim == 1:
-        part.data[rows] = found.data
-        return None
-    part.data[rows] = found.data[:, 0]
+        part.data[where] = found.data
+        return []
+    part.data[where] = found.data[:, 0]
     long = np.flatnonzero(found.length > SHORT)
-    return rows[long], found.data[long]
+    return [(rows[long], found.data[long])] if len(long) else []

@@ -42,6 +42,7 @@ _KEEP: Final = np.array(
     [[(1 << 8 * min(max(n - w, 0), 8)) - 1 for w in range(0, LONG, 8)] for n in range(LONG + 1)], dtype=np.uint64
 )
 """(65,8): of eight little-endian words, the first n bytes."""
+_KEEP_FIRST: Final = _KEEP[:, 0].copy()
 _REQUEST: Final = 2
 
 ZERO_FILLED: Final = "FD frames with fewer bytes than they state, filled with zeros"
@@ -103,7 +104,7 @@ def _classic(group: Group) -> Found:
 
 def _cut(data: Words, length: NDArray[np.uint8]) -> Words:
     """Words of which only so many bytes are data, the rest zero."""
-    return data.copy() if length.min(initial=SHORT) == SHORT else data & _KEEP[length, 0]
+    return data.copy() if length.min(initial=SHORT) == SHORT else data & _KEEP_FIRST.take(length)
 
 
 def _sent(flags: NDArray[np.uint8], group: Group) -> NDArray[np.uint8]:
@@ -111,15 +112,16 @@ def _sent(flags: NDArray[np.uint8], group: Group) -> NDArray[np.uint8]:
     if not flags.any():
         return np.zeros(len(flags), dtype=np.uint8)
     group.odd(REQUESTS, _count(flags & _DIRECTION == _REQUEST))
-    return _FLAGS[flags]
+    return _FLAGS.take(flags)
 
 
 def _there(length: NDArray[np.uint8], there: NDArray[np.int64], remote: Any, group: Group) -> NDArray[np.uint8]:
     """Bytes of data of each frame that its object really holds; of a remote frame, those it asks for."""
-    missing = (there < length) & ~remote
-    if not missing.any():
+    if there.min(initial=LONG) >= length.max(initial=0):
         return length
-    group.damaged("a frame's object ends before its data", missing)
+    missing = (there < length) & ~remote
+    if missing.any():
+        group.damaged("a frame's object ends before its data", missing)
     return np.where(missing, there, length).astype(np.uint8)
 
 
@@ -138,7 +140,9 @@ def _fd(group: Group) -> Found:
     kind = _sent(record["flags"], group) | _FD_FLAGS[record["fd"]]
     remote = kind & REMOTE != 0
     length = _there(_valid(group, kind, remote), group.room - (_FD.itemsize - LONG), remote, group)
-    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[length * ~remote])
+    return Found(
+        record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP.take(length * ~remote, axis=0)
+    )
 
 
 def _fd64(group: Group) -> Found:
@@ -155,7 +159,7 @@ def _fd64(group: Group) -> Found:
     there = np.where(more > 0, np.minimum(more - group.header, group.room), group.room) - (_FD64.itemsize - LONG)
     group.odd(ZERO_FILLED, _count(~remote & (there < length)))
     kept = np.clip(there, 0, length) * ~remote
-    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP[kept])
+    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP.take(kept, axis=0))
 
 
 def _valid(group: Group, kind: NDArray[np.uint8], remote: NDArray[np.bool_]) -> NDArray[np.uint8]:
