@@ -232,6 +232,18 @@ def test_a_truncated_file_is_read_to_its_last_good_chunk(tmp_path: Path, compres
             assert "an unknown number of messages lost" in said(found)
 
 
+def test_a_damaged_summary_loses_nothing(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "t.mcap")
+    data = bytearray(path.read_bytes())
+    data[of(data, Opcode.STATISTICS)[0][0] + 12] ^= 1
+    path.write_bytes(data)
+    found = pq(path)
+    assert pairs(found) == expected()
+    assert [(d.what, d.lost) for d in found.damage] == [
+        ("summary: its checksum (CRC) does not hold", "its counts and copies are not used")
+    ]
+
+
 def test_a_file_cut_within_its_summary_loses_nothing(tmp_path: Path) -> None:
     path = write_log(tmp_path / "t.mcap")
     data = path.read_bytes()

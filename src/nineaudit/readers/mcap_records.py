@@ -115,7 +115,7 @@ def _end(data: memoryview, record: Record, last: Summary, book: Book) -> None:
     if record.op == parse.FOOTER:
         book.damages.add("the data section has no end record", record.at, words="its checksum is not there")
         return
-    if last.whole and record.end != last.end:
+    if last.whole and last.good and record.end != last.end:
         book.damages.add("bytes between data section and summary", record.end, lost=None)
     try:
         crc = parse.data_end(data, record)

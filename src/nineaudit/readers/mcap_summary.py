@@ -20,10 +20,12 @@ _BLOCK: Final = 2**22
 @dataclass(frozen=True)
 class Summary:
     """What the summary says: copies of definitions, the statistics, the bytes where chunks begin (ascending). `end`:
-    the byte where the data section must end; `whole`: there is a footer."""
+    the byte where the data section must end; `whole`: there is a footer; `good`: and what it
+    points to can be read."""
 
     end: int
     whole: bool = False
+    good: bool = True
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     statistics: Statistics | None = None
@@ -43,7 +45,7 @@ def summary(data: memoryview, damages: Damages) -> Summary:
         return _read(data, foot, footer)
     except Malformed as error:
         damages.add(f"summary: {error}", foot, words="its counts and copies are not used")
-        return Summary(foot, whole=True)
+        return Summary(foot, whole=True, good=False)
 
 
 def _read(data: memoryview, foot: int, footer: parse.Footer) -> Summary:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -63,14 +64,18 @@ class Stream:
         return Column(np.concatenate(values), np.concatenate(there))
 
 
+Key = tuple[Channel, Schema | None]
+_NEW: Final = Stream("", Json(), [])
+
+
 @dataclass
 class Topics:
-    """The streams of a log that a rig's signals are on, by channel id and definition."""
+    """The streams of a log, by definition of their channel: those that a rig's signals are on hold numbers."""
 
     rig: Rig
     path: Path
     book: Book
-    streams: dict[Channel, Stream | None] = field(default_factory=dict)
+    streams: dict[Key, Stream | None] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
     undecodable: int = 0
 
@@ -78,24 +83,32 @@ class Topics:
         """Whether messages of a channel are to be read: it is on a topic that is named, or a field is looked for."""
         if channel.topic in self.named:
             return True
-        return bool(self.bare) and channel.encoding in READABLE and self.streams.get(channel, self) is not None
+        if not self.bare or channel.encoding not in READABLE:
+            return False
+        stream = self.streams.get(self.key(channel), _NEW)
+        return stream is _NEW or (stream is not None and bool(stream.paths))
 
-    @property
+    def key(self, channel: Channel) -> Key:
+        """A channel with its schema: messages of an id that is defined anew are another stream."""
+        return channel, self.book.schemas.get(channel.schema_id)
+
+    @cached_property
     def named(self) -> frozenset[str]:
         """Topics that signals name."""
         return frozenset(s.signal.partition(":")[0] for s in self.rig.array.sensors if ":" in s.signal)
 
-    @property
+    @cached_property
     def bare(self) -> tuple[str, ...]:
         """Signals that name no topic."""
         return tuple(dict.fromkeys(s.signal for s in self.rig.array.sensors if ":" not in s.signal))
 
     def take(self, batch: Batch) -> None:
         """The numbers of a batch."""
-        if batch.channel not in self.streams:
-            self.streams[batch.channel] = self.opened(batch)
-        stream = self.streams[batch.channel]
-        if stream is None:
+        key = self.key(batch.channel)
+        if key not in self.streams:
+            self.streams[key] = self.opened(batch)
+        stream = self.streams[key]
+        if stream is None or not stream.paths:
             return
         found = stream.decoder.read(batch, [*stream.paths, *stream.stamp])
         for path, column in zip([*stream.paths, *stream.stamp], found.columns, strict=True):
@@ -116,10 +129,10 @@ class Topics:
             self.book.damages.add(what, batch.at, count=longer, words="what the schema describes of it is read")
 
     def opened(self, batch: Batch) -> Stream | None:
-        """The stream of a channel by its first messages; None where it carries no signal."""
+        """The stream of a channel by its first messages; None where they cannot be decoded."""
         topic = batch.channel.topic
         try:
-            reader = decoder(batch.channel, self.book.schemas.get(batch.channel.schema_id))
+            reader = decoder(*self.key(batch.channel))
         except Undecodable as error:
             self.refused[topic] = str(error)
             return None
