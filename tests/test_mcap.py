@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import random
 import re
 import struct
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import lz4.frame
@@ -412,3 +414,19 @@ def test_memory_does_not_grow_with_topics_that_are_not_used(tmp_path: Path) -> N
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2e6  # of 20 MB
+
+
+@pytest.mark.parametrize("kind", ["ros2", "protobuf", "json"])
+def test_an_imu_in_every_encoding_as_the_library_decodes_it(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "benchmarks"))
+    bench, path = importlib.import_module("readers_mcap"), tmp_path / "t.mcap"
+    getattr(bench, f"write_{kind}")(path, 300)
+    times, values = bench.by_library(path, kind)
+    found = read_mcap(path, bench.rig_of(bench.FIELDS))
+    assert found.damage == ()
+    assert found.traces[0].time.tolist() == (times * 1e-9).tolist()
+    assert [t.values.tolist() for t in found.traces] == values.T.tolist()
+    stamped = read_mcap(path, replace(bench.rig_of(bench.FIELDS[:1]), time_signal="header.stamp"))
+    assert stamped.traces[0].time.tolist() == found.traces[0].time.tolist()
