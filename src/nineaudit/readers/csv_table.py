@@ -47,7 +47,7 @@ def _read(first: bytes, rest: Iterator[bytes], encoding: Encoding, path: Path, r
     found = columns.with_units(found, rig, around.units)
     if found.time is None and around.rate is None:
         columns.locate(rig, table.names, path, table.header_place)  # says that there is no column of time
-    rows = Rows(table, found.wanted, path, around.first + 1, keep=found.time is None)
+    rows = Rows(table, found.wanted, path, around.first + 1, keep=found.time is None, whole=path.stat().st_size)
     for block in chain([first[table.offsets[around.first] :]], rest):
         if block:
             rows.add(block)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
+from math import isfinite, nan
 from pathlib import Path
 from typing import Final
 
@@ -120,6 +121,17 @@ def is_number(cell: str) -> bool:
     except ValueError:
         return False
     return "_" not in cell
+
+
+def number(cell: str, decimal: str) -> float:
+    """The finite number in a cell, NaN for anything else (Python's 1_000 is no number here)."""
+    if decimal == ",":
+        cell = "" if "." in cell else cell.replace(",", ".")
+    try:
+        value = nan if "_" in cell or not cell.isascii() else float(cell)
+    except ValueError:
+        return nan
+    return value if isfinite(value) else nan
 
 
 def _stated_separator(lines: Sequence[str]) -> str | None:

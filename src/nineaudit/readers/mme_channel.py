@@ -23,7 +23,7 @@ from typing import Final
 import numpy as np
 
 from nineaudit.array import FloatArray
-from nineaudit.readers.table_rows import number
+from nineaudit.readers.dialect import number
 from nineaudit.recording import Damage
 
 HEADER: Final = 64 * 2**10

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from math import isfinite, isnan, nan
+from math import isnan, nan
 from pathlib import Path
 from typing import Final
 
@@ -17,11 +17,10 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.errors import RecordingError
-from nineaudit.readers import columns
-from nineaudit.readers.dialect import THOUSANDS, Dialect
+from nineaudit.readers.dialect import THOUSANDS, Dialect, number
+from nineaudit.readers.equal_rows import parsed, structure
 from nineaudit.recording import Damage
 
-_QUOTE: Final = b'"'
 _TRAILING: Final = "rows end with a separator that the header does not have: it is left out"
 
 
@@ -29,7 +28,9 @@ _TRAILING: Final = "rows end with a separator that the header does not have: it 
 class Rows:
     """Numbers of the `wanted` columns, NaN where a cell holds none. `line` is the number of the next line.
 
-    `keep`: a row of the wrong length keeps its place, without readings (time is counted in rows).
+    `keep`: a row of the wrong length keeps its place, without readings (time is counted in rows). `whole` bytes of the
+    file: by the first block, as many numbers find room as it may hold (in pages that nothing is written to until then,
+    where many small arrays would be held twice when they are joined).
     """
 
     table: Dialect
@@ -37,7 +38,9 @@ class Rows:
     path: Path
     line: int
     keep: bool = False
-    parts: list[list[FloatArray]] = field(default_factory=list)
+    whole: int = 0
+    size: int = 0
+    buffers: list[FloatArray] = field(default_factory=list)
     bad: Counter[int] = field(default_factory=Counter)
     first_bad: dict[int, str] = field(default_factory=dict)
     ragged: Counter[str] = field(default_factory=Counter)
@@ -51,19 +54,29 @@ class Rows:
         if not block.endswith(b"\n"):
             self.unfinished = self.line + block.count(b"\n")
             block += b"\n"
-        cells, rows = _structure(block, self.table)
+        cells, rows = structure(block, self.table)
         values = self._by_arrow(block, cells) if self._fits(block, cells, rows) else None
         if values is None:
             values, rows = self._by_cell(block), block.count(b"\n")
-        self.parts.append(values)
+        self._keep(values, len(block))
         self.line += rows
 
     def column(self, index: int) -> FloatArray:
-        """(n,) numbers of wanted column number `index`; to be asked for once, its parts are let go."""
-        values = [part[index] for part in self.parts]
-        for part in self.parts:
-            part[index] = np.empty(0)
-        return np.concatenate(values) if values else np.empty(0)
+        """(n,) numbers of wanted column number `index`."""
+        return self.buffers[index][: self.size] if self.buffers else np.empty(0)
+
+    def _keep(self, values: Sequence[FloatArray], length: int) -> None:
+        end = self.size + values[0].size
+        if not self.buffers:
+            room = int(1.05 * end * max(self.whole / length, 1.0))
+            self.buffers = [np.empty(room) for _ in self.wanted]
+        for i, numbers in enumerate(values):
+            if end > self.buffers[i].size:
+                larger = np.empty(end + end // 4)
+                larger[: self.size] = self.buffers[i][: self.size]
+                self.buffers[i] = larger
+            self.buffers[i][self.size : end] = numbers
+        self.size = end
 
     def notes(self) -> Iterator[str]:
         """What holds no number, by column, and what else was seen."""
@@ -94,9 +107,9 @@ class Rows:
 
     def _by_arrow(self, block: bytes, cells: int) -> list[FloatArray] | None:
         """The columns of a block of equal rows, None where cells hold what Arrow does not read."""
-        values = _parsed(block, self.table, self.wanted, cells)
+        values = parsed(block, self.table, self.wanted, cells)
         if values is None:
-            values = _parsed(self._without_words(block), self.table, self.wanted, cells)
+            values = parsed(self._without_words(block), self.table, self.wanted, cells)
         if values is None:
             return None
         lines: list[bytes] = []
@@ -132,13 +145,13 @@ class Rows:
 
     def _by_cell(self, block: bytes) -> list[FloatArray]:
         values: list[list[float]] = [[] for _ in self.wanted]
-        for number, line in enumerate(block[:-1].split(b"\n"), self.line):
+        for place, line in enumerate(block[:-1].split(b"\n"), self.line):
             if not line.strip():
                 continue
             if line.lstrip().startswith(b"#"):
                 self.comments += 1
                 continue
-            for column, numbers in zip(values, self._row(line, number), strict=False):
+            for column, numbers in zip(values, self._row(line, place), strict=False):
                 column.append(numbers)
         return [np.array(v) for v in values]
 
@@ -184,58 +197,3 @@ class Rows:
                 expected=f"a number with a decimal {'comma' if self.table.decimal == ',' else 'point'} alone",
                 advice="export without thousands separators, or set [recording] separator and decimal in the rig file",
             )
-
-
-def number(cell: str, decimal: str) -> float:
-    """The finite number in a cell, NaN for anything else (Python's 1_000 is no number here)."""
-    if decimal == ",":
-        cell = "" if "." in cell else cell.replace(",", ".")
-    try:
-        value = nan if "_" in cell or not cell.isascii() else float(cell)
-    except ValueError:
-        return nan
-    return value if isfinite(value) else nan
-
-
-def _structure(block: bytes, table: Dialect) -> tuple[int, int]:
-    """(cells of every row, rows) of a block; cells 0 where rows differ, or hold what only `_by_cell` reads."""
-    separator = table.separator.encode()
-    comment = block.startswith(b"#") or b"\n#" in block
-    if comment or table.decimal == table.separator or len(table.names) < 2 or len(separator) != 1:
-        return 0, 0
-    marks = block.translate(None, _OTHERS.get(separator) or _others(separator))
-    row = marks[: marks.index(b"\n") + 1]
-    cells, rows = row.removesuffix(b"\n").removesuffix(b"\r").split(separator), len(marks) // len(row)
-    plain = all(cell in (b"", b'""') for cell in cells)
-    return (len(cells) if plain and row * rows == marks else 0), rows
-
-
-def _others(separator: bytes) -> bytes:
-    """All bytes but those that structure a table: separator, quote, line ends and NUL."""
-    return bytes(set(range(256)).difference(separator + b'"\r\n\0'))
-
-
-_OTHERS: Final = {mark: _others(mark) for mark in (b",", b";", b"\t", b"|")}
-
-
-def _parsed(block: bytes, table: Dialect, wanted: Sequence[int], cells: int) -> list[FloatArray] | None:
-    import pyarrow as pa
-    from pyarrow import csv
-
-    names = [f"c{i}" for i in dict.fromkeys(wanted)]
-    try:
-        parsed = csv.read_csv(
-            pa.BufferReader(block),
-            read_options=csv.ReadOptions(
-                column_names=[f"c{i}" for i in range(cells)], use_threads=False, block_size=len(block) + 1
-            ),
-            parse_options=csv.ParseOptions(
-                delimiter=table.separator, quote_char='"' if _QUOTE in block else False, ignore_empty_lines=False
-            ),
-            convert_options=csv.ConvertOptions(
-                include_columns=names, column_types=dict.fromkeys(names, pa.float64()), decimal_point=table.decimal
-            ),
-        )
-    except pa.ArrowInvalid:
-        return None
-    return [columns.floats(parsed.column(f"c{i}")) for i in wanted]
