@@ -64,10 +64,11 @@ def test_the_example_shows_what_the_readme_says(tmp_path: Path, monkeypatch: pyt
 def test_the_rig_file_of_the_readme_is_one() -> None:
     from nineaudit.rig import parse_rig
 
-    (text,) = blocks("toml")
+    text, parts = blocks("toml")
     rig = parse_rig(text)
     assert len(rig.array) == 9
     assert rig.array["a1y"].serial == "4711"
+    assert [part.offset for part in parse_rig(text + parts).parts] == [0.0, 0.0125]
 
 
 def test_the_python_of_the_readme_runs(

@@ -24,10 +24,11 @@ from nineaudit.recording import Trace
 
 LEAST_EXPLAINED: Final = 0.5
 """Of the variance: two sensors that share less are no clock."""
-RIVAL: Final = 0.9
+RIVAL: Final = 0.8
 """Of the best explained variance: another offset that explains more makes it ambiguous."""
 _WIDTHS: Final = (2.0, 3.0, 4.0)  # steps: Gaussian means against noise; what they differ by is uncertainty
 _MOST: Final = 2**18  # samples of the common grid
+_BROAD: Final = 0.25  # of all offsets: a peak that is wider is none
 _RANK: Final = 1e-6
 _STEPS: Final = 20
 _BLOCKS: Final = 8
@@ -120,18 +121,20 @@ def _coarse(x: _Signals, y: _Signals, step: float, path: Path) -> tuple[float, f
 
 
 def _require_one(explained: FloatArray, best: int, step: float, path: Path) -> None:
-    """No other offset may explain as much: what a periodic motion does."""
+    """No other offset may explain as much (what a periodic motion does), nor all of them (what a steady turn does)."""
     low = np.flatnonzero(explained < _WIDTH * explained[best])
-    before, after = low[low < best], low[low > best]
+    first = int(low[low < best].max(initial=0))
+    last = int(low[low > best].min(initial=explained.size))
     beyond = explained.copy()
-    beyond[(before[-1] if before.size else 0) : (after[0] if after.size else explained.size) + 1] = 0.0
+    beyond[first : last + 1] = 0.0
     rival = int(np.argmax(beyond))
+    what = ""
     if beyond[rival] > RIVAL * explained[best]:
-        raise RecordingError(
-            f"two offsets are as good, {abs(rival - best) * step:.4g} s apart: the motion repeats itself",
-            file=path,
-            advice="state offset_s in the rig file",
-        )
+        what = f"two offsets are as good, {abs(rival - best) * step:.4g} s apart: the motion repeats itself"
+    elif last - first > _BROAD * explained.size:
+        what = f"all offsets within {(last - first) * step:.4g} s are as good: the motion tells no time"
+    if what:
+        raise RecordingError(what, file=path, advice="state offset_s in the rig file")
 
 
 def _white(signals: _Signals, width: float) -> _Signals:
