@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,7 @@ SENSORS = {
     "a1z": ("accelerometer", (50, 0, 0), (0, 0, 1), "NAAP_B.A1Z"),
     "wx": ("gyroscope", (0, 0, 0), (1, 0, 0), "NAAP_B.WX"),
 }
-CAN_FORMATS = (".blf", ".asc", ".log", ".trc", ".can.csv", ".mf4")
+CAN_FORMATS = (".blf", ".asc", ".log", ".trc", ".can.csv", ".mf4", ".db")
 TABLE_FORMATS = (".csv", ".tsv", ".txt", ".parquet", ".mcap", ".mme", ".zip")
 
 
@@ -52,7 +53,7 @@ def database(rig: Rig, folder: Path) -> Path:
 def write_any(recording: Recording, folder: Path, suffix: str) -> Path:
     """Write in one of the formats above; those that only python-can writes go through its own writers."""
     path = folder / f"recording{suffix}"
-    if suffix in (".log", ".trc", ".can.csv", ".mf4"):
+    if suffix in (".log", ".trc", ".can.csv", ".mf4", ".db"):
         return _by_python_can(recording, folder, path, suffix)
     write_recording(recording, path, dbc=database(recording.rig, folder))
     return path
@@ -65,9 +66,11 @@ def _by_python_can(recording: Recording, folder: Path, path: Path, suffix: str) 
     source = folder / "source.blf"
     write_recording(shifted, source, dbc=database(recording.rig, folder), force=True)
     writers = {".log": can.CanutilsLogWriter, ".trc": can.TRCWriter, ".can.csv": can.CSVWriter}
-    writer = can.MF4Writer if suffix == ".mf4" else writers[suffix]
-    with can.BLFReader(source) as frames, writer(path) as out:
+    writers |= {".mf4": can.MF4Writer, ".db": can.SqliteWriter}
+    with can.BLFReader(source) as frames, writers[suffix](path) as out:
         for frame in frames:
             frame.timestamp += 1_700_000_000.0
             out.on_message_received(frame)
+        while suffix == ".db" and not out.buffer.empty():  # what waits when it is stopped, python-can loses
+            time.sleep(0.01)
     return path

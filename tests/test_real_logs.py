@@ -55,7 +55,7 @@ def test_rav4_blf_against_the_reference_decoder(shared_data: Path) -> None:
     for channel, signal, factor in (("ax", "ACCEL_X", 1.0), ("ay", "ACCEL_Y", 1.0), ("wz", "YAW_RATE", np.pi / 180)):
         np.testing.assert_allclose(found.column(channel), [f[signal] * factor for _, f in frames], rtol=1e-14)
     stamps = np.array([t for t, _ in frames])
-    np.testing.assert_array_equal(found.time, stamps - stamps[0])
+    np.testing.assert_allclose(found.time, stamps - stamps[0], atol=2.4e-7)  # a date in floating-point seconds
 
 
 def test_rav4_clock_is_called_unsteady_not_lossy(shared_data: Path) -> None:
@@ -108,7 +108,7 @@ def test_canmod_against_extract_bus_logging(shared_data: Path) -> None:
     ):
         for channel, signal, factor in (("ax", "AccelerationX", 1.0), ("wz", "AngularRateZ", np.pi / 180)):
             reference = decoded.get(signal)
-            np.testing.assert_array_equal(found.time, reference.timestamps)
+            np.testing.assert_allclose(found.time, reference.timestamps, rtol=3e-16)  # ours counts whole nanoseconds
             np.testing.assert_allclose(found.column(channel), reference.samples * factor, rtol=1e-12)
 
 
@@ -132,15 +132,19 @@ def test_canmod_hole_is_found(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize("part", [0.3, 0.8])
-def test_a_cut_drive_says_what_could_be_read(shared_data: Path, tmp_path: Path, part: float) -> None:
+def test_of_a_cut_drive_what_is_there_is_read(shared_data: Path, tmp_path: Path, part: float) -> None:
     data = (shared_data / "rav4-can" / "drive-60s.blf").read_bytes()
     path = tmp_path / "cut.blf"
     path.write_bytes(data[: int(part * len(data))])
     rig = load_rig(RIGS / "rav4-kinematics.toml")
-    with pytest.raises(
-        RecordingError, match=r"[1-9]\d{3,} frames \(0 s to \d+\.?\d* s after the first\) could be read"
-    ):
-        read(path, rig, dbc=[shared_data / "rav4-can" / "toyota_2017.dbc"])
+    whole, found = (
+        read(file, rig, dbc=[shared_data / "rav4-can" / "toyota_2017.dbc"])
+        for file in (shared_data / "rav4-can" / "drive-60s.blf", path)
+    )
+    assert found.source.damage
+    n = found.time.size
+    assert 0.9 * part < n / whole.time.size < part + 0.05
+    np.testing.assert_array_equal(found.readings, whole.readings[:n])
 
 
 @pytest.mark.parametrize(

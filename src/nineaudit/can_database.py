@@ -36,8 +36,21 @@ class BusSignal:
         return self.signal.multiplexer_ids is None
 
 
+@dataclass(frozen=True)
+class Databases:
+    """Messages of all databases, and the `bit_rate` (bit/s) of the bus where one states it (attribute Baudrate)."""
+
+    messages: tuple[Any, ...]
+    bit_rate: float | None
+
+
 def load_databases(paths: Sequence[Path]) -> tuple[Any, ...]:
     """Messages of all databases. Raises ConfigurationError where one cannot be read, or where there is none."""
+    return read_databases(paths).messages
+
+
+def read_databases(paths: Sequence[Path]) -> Databases:
+    """All that is taken from databases. Raises ConfigurationError as load_databases does."""
     from cantools.database import load_file
     from cantools.database.errors import Error
 
@@ -46,11 +59,11 @@ def load_databases(paths: Sequence[Path]) -> tuple[Any, ...]:
             "a CAN log needs a database to decode it, and none is given",
             advice="name it in the rig file ([recording] dbc = [...]) or with --dbc",
         )
-    messages: list[Any] = []
+    messages, rates = list[Any](), list[float]()
     for path in paths:
         try:
             # Not strict: databases in use have overlapping signals in messages that do not matter here.
-            messages += getattr(load_file(path, strict=False), "messages", [])
+            database = load_file(path, strict=False)
         except OSError as error:
             raise ConfigurationError(f"cannot read the CAN database: {error.strerror or error}", file=path) from error
         except (Error, ValueError) as error:
@@ -59,7 +72,16 @@ def load_databases(paths: Sequence[Path]) -> tuple[Any, ...]:
                 file=path,
                 expected="a .dbc, .arxml, .kcd or .sym file",
             ) from error
-    return tuple(messages)
+        messages += getattr(database, "messages", [])
+        rates += _bit_rates(database)
+    return Databases(tuple(messages), rates[0] if len(set(rates)) == 1 else None)
+
+
+def _bit_rates(database: Any) -> list[float]:
+    """Baudrate, an attribute of a DBC file, in bit/s (0: not stated)."""
+    attributes = getattr(getattr(database, "dbc", None), "attributes", None) or {}
+    stated = getattr(attributes.get("Baudrate"), "value", None)
+    return [float(stated)] if isinstance(stated, (int, float)) and stated > 0 else []
 
 
 def _first_line(error: Exception) -> str:

@@ -21,6 +21,7 @@ from nineaudit.readers.contents import Contents
 from nineaudit.readers.csv_table import read_text_table
 from nineaudit.readers.joined import join
 from nineaudit.readers.mcap_log import read_mcap
+from nineaudit.readers.mdf_signals import read_mf4
 from nineaudit.readers.mme import read_mme
 from nineaudit.readers.parquet_table import read_parquet
 from nineaudit.recording import Recording, Source
@@ -45,9 +46,9 @@ _MAGIC: Final = {
     b"%PDF": ("", "a PDF document"),
     b"\x89PNG": ("", "a PNG picture"),
     b"\x89HDF": ("", "an HDF5 file"),
-    b"SQLite format 3": ("", "an SQLite database"),
+    b"SQLite format 3": (".db", "an SQLite database"),
 }
-_BINARY: Final = (".blf", ".mcap", ".mf4", ".parquet", ".zip")
+_BINARY: Final = (".db", ".blf", ".mcap", ".mf4", ".parquet", ".zip")
 
 
 def _read_csv(path: Path, rig: Rig) -> Contents:
@@ -66,7 +67,8 @@ READERS: Final[Mapping[str, Reader]] = {
     ".asc": read_can,
     ".log": read_can,
     ".trc": read_can,
-    ".mf4": read_can,
+    ".mf4": read_mf4,
+    ".db": read_can,
     ".mcap": read_mcap,
     ".mme": read_mme,
     ".zip": read_mme,

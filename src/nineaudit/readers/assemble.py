@@ -61,6 +61,7 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
         clocks=clocks,
         resampled=tuple(a.channel for a in alignments),
         alignments=alignments,
+        bus=contents.bus,
     )
 
 

@@ -12,7 +12,7 @@ from nineaudit.can_bits import ByteMatrix
 from nineaudit.can_database import EXTENDED, BusSignal
 from nineaudit.readers import bus_signals
 from nineaudit.readers.can_frames import ERROR, FD, OVERLOAD, Frames, Rows
-from nineaudit.readers.clock import _deviation as deviation
+from nineaudit.readers.clock import deviation
 
 WINDOW: Final = 0.1
 """Seconds of the window in which the busiest load is looked for."""
@@ -42,7 +42,7 @@ def _groups(log: Frames) -> Iterator[Rows]:
 def _identifier(log: Frames, rows: Rows, known: Mapping[int, Any], used: Container[int]) -> Identifier:
     key, message = int(log.key[rows[0]]), known.get(int(log.key[rows[0]]))
     time, payload, length = log.time[rows], log.payload(rows), log.length[rows]
-    steps = np.diff(time) * 1e-9
+    steps = np.diff(time) / 1e9
     interval = float(np.median(steps)) if len(steps) > 1 else float("nan")
     told = {} if message is None else _of_message(message, key, payload, length)
     return Identifier(
@@ -51,8 +51,8 @@ def _identifier(log: Frames, rows: Rows, known: Mapping[int, Any], used: Contain
         bus=log.buses[log.bus[rows[0]]],
         used=key in used,
         frames=len(rows),
-        first=(int(time.min()) + log.origin) * 1e-9,
-        last=(int(time.max()) + log.origin) * 1e-9,
+        first=(int(time.min()) + log.origin) / 1e9,
+        last=(int(time.max()) + log.origin) / 1e9,
         interval=interval,
         jitter=deviation(steps, interval) if len(steps) > 1 else float("nan"),
         longest=float(steps.max()) if len(steps) > 1 else float("nan"),
@@ -86,7 +86,7 @@ def _restarts(log: Frames) -> tuple[int, float | None]:
         back = np.flatnonzero(np.diff(time) < 0)
         count += len(back)
         if len(back):
-            at = (int(time[back[0] + 1]) + log.origin) * 1e-9
+            at = (int(time[back[0] + 1]) + log.origin) / 1e9
             first = at if first is None else min(first, at)
     return count, first
 
@@ -107,7 +107,7 @@ def _loads(log: Frames) -> Iterator[Load]:
         low, high = (np.bincount(windows, weights=bits[rows]) for bits in (least, most))
         yield Load(
             bus=log.buses[bus],
-            duration=float(since.max()) * 1e-9,
+            duration=float(since.max()) / 1e9,
             least=float(low.sum()),
             most=float(high.sum()),
             window=WINDOW,

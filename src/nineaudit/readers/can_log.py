@@ -2,125 +2,153 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from nineaudit import can_bits, can_database
-from nineaudit.array import FloatArray, frozen
+from nineaudit.array import BoolArray, FloatArray, frozen
 from nineaudit.can_bits import bytes_needed
 from nineaudit.can_database import BusSignal
 from nineaudit.errors import RecordingError
-from nineaudit.readers import frames as frame_log
-from nineaudit.readers import mdf
+from nineaudit.readers.asc import read_asc
+from nineaudit.readers.blf import read_blf
+from nineaudit.readers.bus_signals import unavailable
+from nineaudit.readers.bus_summary import bus_of
+from nineaudit.readers.by_python_can import read_by_python_can
+from nineaudit.readers.can_frames import ERROR, IDENTIFIER, OVERLOAD, REMOTE, Frames, Rows, key_counts
+from nineaudit.readers.candump import read_candump
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.frames import Frames, Series
+from nineaudit.readers.mdf import read_mdf
 from nineaudit.recording import Trace
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
+
+FRAME_READERS: Final[Mapping[str, Callable[[Path], Frames]]] = {
+    ".blf": read_blf,
+    ".asc": read_asc,
+    ".log": read_candump,
+    ".mf4": read_mdf,
+    ".trc": read_by_python_can,
+    ".csv": read_by_python_can,
+    ".db": read_by_python_can,
+}
+_DATES: Final = 10**15
+"""Nanoseconds (11 days): first stamps beyond are dates."""
 
 
 def read_can(path: Path, rig: Rig) -> Contents:
     """Signals (Message.Signal, or Signal alone where it is unique) of a log, with the units of the database.
 
     A frame that is too short for its message or cannot be decoded is a reading that is not valid (NaN), and
-    counted. Raises ConfigurationError: no database, unknown signal; RecordingError: damaged, empty, or without
-    the message of a channel.
+    counted. Raises ConfigurationError: no database, unknown signal; RecordingError: no frames, or none of the
+    message of a channel.
     """
-    messages = can_database.load_databases(rig.dbc)
+    databases = can_database.read_databases(rig.dbc)
+    messages = databases.messages
     found = [can_database.find_signal(messages, sensor.signal) for sensor in rig.array.sensors]
-    keys = {signal.key for signal in found}
-    reader = mdf.read_mdf if path.suffix.lower() == ".mf4" else frame_log.read_frames
-    log = reader(path, keys)
-    if not log.counts["frames"]:
-        raise RecordingError("no CAN frames in this log", file=path)
-    series, notes, dropped = _one_bus(log)
-    known = {BusSignal(m, None).key for m in messages}
-    counts: dict[str, float] = {
-        **log.counts,
-        "frames_used": sum(len(s.time) for s in series.values()),
-        "frames_not_in_database": sum(n for key, n in log.ids.items() if key not in known),
-        "frames_of_other_buses": dropped,
-        "short_frames": 0,
-        "undecodable_frames": 0,
-    }
-    traces = []
-    bad: dict[int, tuple[int, int]] = {}
+    log = FRAME_READERS[path.suffix.lower()](path)
+    if not len(log):
+        raise RecordingError("no CAN frames in this log", file=path, found="; ".join(map(str, log.damage)) or None)
+    seen = key_counts(log)
+    rows, notes, left_out = {}, list[str](), 0
     for sensor, signal in zip(rig.array.sensors, found, strict=True):
-        frames = _of(signal, series, sensor.channel, log, messages, path)
-        time, values, short, undecodable = _decode(signal, frames)
-        bad[signal.key] = max(bad.get(signal.key, (0, 0)), (short, undecodable))
+        if signal.key not in rows:
+            _require_seen(signal, sensor.channel, seen, messages, len(log), path)
+            rows[signal.key], others = _one_bus(log, signal.key)
+            notes += others
+            left_out += seen[signal.key] - len(rows[signal.key])
+    base, dated = _base(log, rows)
+    traces, bad, silent = [], dict[int, tuple[int, int]](), 0
+    for sensor, signal in zip(rig.array.sensors, found, strict=True):
+        chosen = rows[signal.key]
+        values, carried, lost = _decode(signal, log, chosen)
+        bad[signal.key] = max(bad.get(signal.key, (0, 0)), (lost.short, lost.undecodable))
+        silent += lost.unavailable
+        time = (log.time[chosen[carried]] - base) / 1e9
         traces.append(Trace(sensor.channel, signal.name, frozen(time), frozen(values), signal.signal.unit))
-    counts["short_frames"] = sum(short for short, _ in bad.values())
-    counts["undecodable_frames"] = sum(undecodable for _, undecodable in bad.values())
-    return Contents(tuple(traces), counts, (*log.notes, *notes))
+    known = {BusSignal(m, None).key for m in messages}
+    counts = {
+        **_counts(log),
+        "frames_used": float(sum(len(r) for r in rows.values())),
+        "frames_not_in_database": float(sum(n for key, n in seen.items() if key not in known)),
+        "frames_of_other_buses": float(left_out),
+        "short_frames": float(sum(short for short, _ in bad.values())),
+        "undecodable_frames": float(sum(undecodable for _, undecodable in bad.values())),
+        "unavailable_values": float(silent),
+    }
+    bus = bus_of(log, messages, rows, databases.bit_rate)
+    return Contents(tuple(traces), counts, (*log.notes, *dated, *notes), log.damage, bus)
 
 
-def _of(
-    signal: BusSignal,
-    series: dict[int, Series],
-    channel: str,
-    log: Frames,
-    messages: Sequence[Any],
-    path: Path,
-) -> Series:
-    if signal.key in series:
-        return series[signal.key]
+def _counts(log: Frames) -> dict[str, float]:
+    bits = {"error_frames": ERROR, "remote_frames": REMOTE, "overload_frames": OVERLOAD}
+    kinds = {name: float(np.count_nonzero(log.kind & bit)) for name, bit in bits.items()}
+    size = float(log.length[log.is_data].sum(dtype=np.int64))
+    return {**log.counts, "frames": float(len(log)), **kinds, "bytes": size}
+
+
+def _require_seen(
+    signal: BusSignal, channel: str, seen: Mapping[int, int], messages: Sequence[Any], frames: int, path: Path
+) -> None:
+    if signal.key in seen:
+        return
     names = {BusSignal(m, None).key: m.name for m in messages}
-    seen = [f"{names.get(key, '?')} 0x{key & 0x1FFFFFFF:X}" for key, _ in log.ids.most_common(5)]
+    most = sorted(seen, key=lambda key: -seen[key])[:5]
+    shown = [f"{names.get(key, '?')} 0x{key & IDENTIFIER:X}" for key in most]
     raise RecordingError(
         f"missing channel {channel!r}: no frame of message {signal.message.name}"
         f" (0x{signal.message.frame_id:X}) in this log",
         file=path,
-        found=f"{int(log.counts['frames'])} frames, most of them {', '.join(seen) or 'error frames'}",
+        found=f"{frames} frames, most of them {', '.join(shown) or 'error frames'}",
     )
 
 
-def _one_bus(log: Frames) -> tuple[dict[int, Series], list[str], int]:
-    """Each message from one bus only: from the one that carries most of it, with a note on what is left out."""
-    series, notes, dropped = {}, [], 0
-    for key, frames in log.series.items():
-        buses = Counter(frames.bus)
-        (bus, count), *others = buses.most_common()
-        if others:
-            rows = np.array([b == bus for b in frames.bus])
-            frames = Series(frames.time[rows], frames.payload[rows], frames.length[rows], (bus,) * count)
-            left = ", ".join(f"{n} on bus {name}" for name, n in others)
-            notes.append(f"message 0x{key & 0x1FFFFFFF:X} is taken from bus {bus}; {left} are left out")
-            dropped += sum(n for _, n in others)
-        series[key] = frames
-    return series, notes, dropped
+def _one_bus(log: Frames, key: int) -> tuple[Rows, list[str]]:
+    """Rows of a message on one bus only: the one that carries most of it, with a note on what is left out."""
+    rows = log.rows_of(key)
+    shares = np.bincount(log.bus[rows])
+    bus = int(shares.argmax())
+    others = [f"{n} on bus {log.buses[i]}" for i, n in enumerate(shares.tolist()) if n and i != bus]
+    if not others:
+        return rows, []
+    name = f"message 0x{key & IDENTIFIER:X} is taken from bus {log.buses[bus]}"
+    return rows[log.bus[rows] == bus], [f"{name}; {', '.join(others)} are left out"]
 
 
-def _decode(signal: BusSignal, frames: Series) -> tuple[FloatArray, FloatArray, int, int]:
-    """(n,) s, (n,) values in the database's unit, NaN where a frame is too short or does not decode; counts of both.
+def _base(log: Frames, rows: Mapping[int, Rows]) -> tuple[int, list[str]]:
+    """What is taken from the log's stamps, ns, and the note that says so: dates count from the first that is used."""
+    first = min(int(log.time[r[0]]) for r in rows.values())
+    if first + log.origin <= _DATES:
+        return -log.origin, []
+    return first, [f"time stamps are dates; they are counted from the first, {(first + log.origin) / 1e9!r} s"]
 
-    Of a multiplexed signal only the frames that carry it are samples.
+
+@dataclass(frozen=True)
+class _Lost:
+    """Frames without a reading: too `short` for the message, `undecodable`, or with a code for `unavailable`."""
+
+    short: int
+    undecodable: int
+    unavailable: int
+
+
+def _decode(signal: BusSignal, log: Frames, rows: Rows) -> tuple[FloatArray, BoolArray, _Lost]:
+    """Values in the database's unit of the frames that carry a signal, NaN where one holds no reading; (len(rows),)
+    which frames those are; and how many are lost how.
+
+    Of a multiplexed signal only the frames that carry it are samples. A frame too short to say is one.
     """
-    needed = bytes_needed(signal.signal)
-    whole = frames.length >= max(signal.message.length, needed)
-    values, carried = np.full(frames.time.size, np.nan), np.ones_like(whole)
-    if signal.plain:
-        payload = np.pad(frames.payload, ((0, 0), (0, max(0, needed - frames.payload.shape[1]))))
-        values[whole] = can_bits.decode(signal.signal, payload[whole])
-    else:
-        decoded = [_one(signal, bytes(p[:n])) for p, n in zip(frames.payload, frames.length, strict=True)]
-        carried = np.array([value is not None for value in decoded])
-        values = np.where(whole, np.array([np.nan if v is None else v for v in decoded]), np.nan)
-    undecodable = np.isnan(values) & whole & carried
-    return frames.time[carried], values[carried], int(np.sum(~whole)), int(np.sum(undecodable))
-
-
-def _one(signal: BusSignal, data: bytes) -> float | None:
-    """A multiplexed signal of one frame: None where the frame does not carry it, NaN where it does not decode."""
-    from cantools.database.errors import DecodeError
-
-    try:
-        value = signal.message.decode(data, decode_choices=False).get(signal.signal.name)
-    except (DecodeError, ValueError):
-        return float("nan")
-    return None if value is None else float(value)
+    payload, length = log.payload(rows), log.length[rows]
+    whole = length >= max(signal.message.length, bytes_needed(signal.signal))
+    carried = can_bits.carried(signal.signal, signal.message, payload) | ~whole
+    payload, whole = payload[carried], whole[carried]
+    values = can_bits.decode(signal.signal, payload)
+    silent = unavailable(signal.signal, payload) & whole
+    undecodable = ~np.isfinite(values) & whole & ~silent
+    values[~whole | silent | undecodable] = np.nan
+    return values, carried, _Lost(*(int(np.count_nonzero(x)) for x in (~whole, undecodable, silent)))

@@ -89,15 +89,15 @@ def _interval(time: FloatArray) -> tuple[float, float]:
     """
     steps = np.diff(time)
     interval = float(np.median(steps))
-    jitter = _deviation(steps, interval)
+    jitter = deviation(steps, interval)
     stride = min(_STRIDE, time.size // 4)
     if stride > 1:
         odd = (np.abs(steps - interval) > _UNSTEADY * interval) & (jitter <= _UNSTEADY * interval)
         before = np.r_[0, np.cumsum(odd)]
         spans = (time[stride:] - time[:-stride])[before[stride:] == before[:-stride]]
         interval = float(np.median(spans)) / stride if spans.size else interval
-    return interval, _deviation(steps, interval)
+    return interval, deviation(steps, interval)
 
 
-def _deviation(steps: FloatArray, interval: float) -> float:
+def deviation(steps: FloatArray, interval: float) -> float:
     return _MAD_TO_SD * float(np.median(np.abs(steps - interval)))

@@ -1,5 +1,5 @@
-"""Measurement MF4: channels that were decoded when they were recorded, by name. A name that is in more than one group
-is told apart as Group.Channel, by the group's acquisition name or number."""
+"""MF4: raw CAN frames, or else channels that were decoded when they were recorded, by name. A name that is in more
+than one group is told apart as Group.Channel, by the group's acquisition name or number."""
 
 from __future__ import annotations
 
@@ -10,12 +10,25 @@ import numpy as np
 
 from nineaudit.array import frozen
 from nineaudit.errors import RecordingError
+from nineaudit.readers.can_log import read_can
 from nineaudit.readers.contents import Contents
+from nineaudit.readers.mdf import holds_frames, opened
 from nineaudit.recording import Trace
 from nineaudit.signals import suggestion
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
+
+
+def read_mf4(path: Path, rig: Rig) -> Contents:
+    """Signals of an MF4 file: of its raw CAN frames, if it has any, through the rig's databases; else its channels.
+
+    Raises ConfigurationError and RecordingError as read_can does, and read_signals.
+    """
+    with opened(path) as log:
+        if not holds_frames(log):
+            return read_signals(log, path, rig)
+    return read_can(path, rig)
 
 
 def read_signals(log: Any, path: Path, rig: Rig) -> Contents:
