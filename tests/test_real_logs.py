@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nineaudit.errors import RecordingError
 from nineaudit.readers import read
 from nineaudit.recording import Recording
 from nineaudit.rig import load_rig, parse_rig
