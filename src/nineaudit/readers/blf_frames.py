@@ -49,8 +49,9 @@ def add_frames(columns: Columns, batch: Batch, account: Account) -> None:
     account.types.update(present)
     if _MARKER in present and not account.origin:
         account.origin = _origin(batch, np.flatnonzero(codes == _MARKER))
-    room = batch.heads["size"].astype(np.int64) - batch.heads["header"]
-    keep = _keep(batch, codes, room, account)
+    header = _common_header(batch.heads)
+    room = batch.heads["size"].astype(np.int64) - (header or batch.heads["header"])
+    keep = _keep(batch, codes, room, header, account)
     if keep is not None:
         batch = replace(batch, at=batch.at[keep], heads=batch.heads[keep])
         codes, room = codes[keep], room[keep]
@@ -59,17 +60,32 @@ def add_frames(columns: Columns, batch: Batch, account: Account) -> None:
     long: list[tuple[Rows, Words]] = []
     for code in present:
         if code in TYPES:
-            for rows, found in _read(batch, codes, room, code, account):
-                long += _put(part, rows, found)
+            rows = np.flatnonzero(codes == code)
+            for some, size in [(rows, header)] if header else _by_header(batch, rows):
+                group = _group(batch, some, room, size, code, account)
+                long += _put(part, some, TYPES[code].read(group))
     columns.add_long(long)
 
 
 def _counted(codes: Codes) -> dict[int, int]:
     """How many there are of each code: most logs hold few, which are looked for one by one."""
-    counts = {code: int(np.count_nonzero(codes == code)) for code in TYPES}
-    if sum(counts.values()) < len(codes):
+    counts: dict[int, int] = {}
+    left = len(codes)
+    for code in TYPES:
+        if left:
+            counts[code] = int(np.count_nonzero(codes == code))
+            left -= counts[code]
+    if left:
         counts = dict(enumerate(np.bincount(codes).tolist()))
     return {code: count for code, count in counts.items() if count}
+
+
+def _common_header(heads: Records) -> int:
+    """Bytes of the headers if they are all of one kind and that one is of frames, else 0."""
+    form = heads["form"]
+    if not len(heads) or form.min() != form.max() or _strange(heads[:1]).any():
+        return 0
+    return int(heads["header"][0])
 
 
 def _origin(batch: Batch, rows: Rows) -> int:
@@ -81,30 +97,24 @@ def _origin(batch: Batch, rows: Rows) -> int:
     return 0
 
 
-def _keep(batch: Batch, codes: Codes, room: Sizes, account: Account) -> NDArray[np.bool_] | None:
+def _keep(batch: Batch, codes: Codes, room: Sizes, header: int, account: Account) -> NDArray[np.bool_] | None:
     """(m,) true for the objects that are frames, and fit to be; None if all are."""
     heads, least = batch.heads, _LEAST.take(codes)
     frames = least > 0
-    small = frames & (room < least)
-    strange = frames & _strange(heads)
-    late = frames & _late(heads, account.start)
     for what, fault in (
-        ("a frame's object is smaller than its fields", small),
-        ("a frame's object has a header of a kind that is not known", strange & ~small),
-        ("a frame is stamped with a time beyond the year 2262", late & ~small & ~strange),
+        ("a frame's object is smaller than its fields", room < least),
+        ("a frame's object has a header of a kind that is not known", _strange(heads[:1] if header else heads)),
+        ("a frame is stamped with a time beyond the year 2262", _late(heads, account.start)),
     ):
-        if fault.any():
+        if fault.any() and (fault := fault & frames).any():
             _book(account, batch, what, fault, int(heads["size"][fault].sum()))
             frames &= ~fault
     return None if frames.all() else frames
 
 
-def _strange(heads: Records) -> Any:
-    """(m,) true where a header is not of a kind that frames have; False if there is none."""
-    form = heads["form"]
-    if len(heads) and form.min() == form.max():
-        heads = heads[:1]
-    return (heads["version"] > 2) | (heads["header"] < HEAD.itemsize)
+def _strange(heads: Records) -> NDArray[np.bool_]:
+    """(m,) true where a header is not of a kind that frames have."""
+    return np.asarray((heads["version"] > 2) | (heads["header"] < HEAD.itemsize))
 
 
 def _book(account: Account, batch: Batch, what: str, fault: NDArray[np.bool_], lost: int = 0) -> None:
@@ -112,10 +122,10 @@ def _book(account: Account, batch: Batch, what: str, fault: NDArray[np.bool_], l
 
 
 def _late(heads: Records, start: int) -> Any:
-    """(m,) true where a time does not fit into int64 ns; False if there is none."""
+    """(m,) true where a time does not fit into int64 ns; (1,) false if there is none."""
     most = np.iinfo(np.int64).max - max(start, 0)
     if int(heads["time"].max(initial=0)) <= most // _TEN_MICROSECONDS:
-        return False
+        return np.zeros(1, dtype=np.bool_)
     limit = np.where(heads["flags"] == _TENS, most // _TEN_MICROSECONDS, most)
     return heads["time"] > limit.astype(np.uint64)
 
@@ -131,15 +141,11 @@ def _put_time(time: NDArray[np.int64], heads: Records, account: Account) -> None
     time += account.start
 
 
-def _read(batch: Batch, codes: Codes, room: Sizes, code: int, account: Account) -> Iterator[tuple[Rows, Found]]:
-    """Frames of one type and their rows, for each size of header that comes with it."""
-    rows = np.flatnonzero(codes == code)
+def _by_header(batch: Batch, rows: Rows) -> Iterator[tuple[Rows, int]]:
+    """Rows of each size of header that comes with them, and that size."""
     headers = batch.heads["header"].take(rows)
-    while len(rows):
-        same = headers == headers[0]
-        chosen = rows if same.all() else rows[same]
-        yield chosen, TYPES[code].read(_group(batch, chosen, room, int(headers[0]), code, account))
-        rows, headers = rows[~same], headers[~same]
+    for header in np.unique(headers).tolist():
+        yield rows[headers == header], header
 
 
 def _group(batch: Batch, rows: Rows, room: Sizes, header: int, code: int, account: Account) -> Group:

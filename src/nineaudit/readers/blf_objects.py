@@ -191,9 +191,9 @@ TYPES: Final[Mapping[int, Type]] = {
     86: Type(_HEAD, _CLASSIC, _classic),  # CAN_MESSAGE2
     100: Type(_FD.itemsize - LONG, _FD, _fd),  # CAN_FD_MESSAGE
     101: Type(_FD64.itemsize - LONG, _FD64, _fd64),  # CAN_FD_MESSAGE_64
-    2: Type(_WIDE.itemsize, _WIDE, _no_data(ERROR)),  # CAN_ERROR
     73: Type(_WIDE.itemsize, _WIDE, _no_data(ERROR)),  # CAN_ERROR_EXT
+    2: Type(_WIDE.itemsize, _WIDE, _no_data(ERROR)),  # CAN_ERROR
     104: Type(_NARROW.itemsize, _NARROW, _no_data(ERROR)),  # CAN_FD_ERROR_64
     3: Type(_WIDE.itemsize, _WIDE, _no_data(OVERLOAD)),  # CAN_OVERLOAD
 }
-"""The types of objects that are CAN frames."""
+"""The types of objects that are CAN frames, the usual first."""

@@ -6,15 +6,12 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
-from typing import Final
 
 import numpy as np
 
 from nineaudit.readers.blf_chain import ROOM, Bytes, Places, Records, follow
 from nineaudit.readers.blf_inflate import NOTHING_BEGINS, Piece
 from nineaudit.readers.losses import Losses
-
-_ZEROS: Final = bytes(ROOM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +51,10 @@ class Stream:
 
     losses: Losses
     rest: _Rest = field(default_factory=_Rest)
+    space: Bytes = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
 
     def batches(self, contents: Iterable[list[Piece]]) -> Iterator[Batch]:
-        """Whole objects of all contents, in the order of the file."""
+        """Whole objects of all contents, in the order of the file. A batch holds until the next is asked for."""
         for pieces in contents:
             for (bare, lost), group in groupby(pieces, key=lambda piece: (piece.bare, piece.fault is not None)):
                 part = list(group)
@@ -89,7 +87,7 @@ class Stream:
         ends = np.cumsum([len(content) for content in contents]).tolist()
         begins = (*before.begins, *ends[:-1])
         files = (*before.files, *((piece.at, piece.bare) for piece in pieces))
-        buffer = np.frombuffer(b"".join([*contents, _ZEROS]), dtype=np.uint8)
+        buffer = self._buffer(contents, ends)
         chain = follow(buffer, synced=before.synced, last=last)
         batch = Batch(buffer, chain.at, chain.heads, begins, files)
         self._book_gaps(batch, chain.gaps, before)
@@ -99,6 +97,16 @@ class Stream:
         self.rest = self._after(batch, buffer[chain.tail : ends[-1]].tobytes(), chain.tail, chain.synced)
         self.rest.lost = before.lost and not len(chain.at)
         return batch
+
+    def _buffer(self, contents: list[bytes], ends: list[int]) -> Bytes:
+        """The contents behind each other and ROOM zeros, always in the same place: new memory costs more than them."""
+        size = ends[-1] + ROOM
+        if size > len(self.space):
+            self.space = np.empty(size + size // 4, dtype=np.uint8)
+        for content, end in zip(contents, ends, strict=True):
+            self.space[end - len(content) : end] = np.frombuffer(content, dtype=np.uint8)
+        self.space[ends[-1] : size] = 0
+        return self.space[:size]
 
     def _after(self, batch: Batch, content: bytes, tail: int, synced: bool) -> _Rest:
         first = max(bisect_right(batch.begins, tail) - 1, 0)
