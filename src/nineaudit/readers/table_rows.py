@@ -94,7 +94,8 @@ class Rows:
             line, found = self.first_ragged[what]
             yield Damage(what, f"line {line}", count, f"{found}; {lost}")
         if self.unfinished:
-            yield Damage("the last line has no line end: the file may be cut", f"line {self.unfinished}")
+            what = "the last line has no line end: the file may be cut"
+            yield Damage(what, f"line {self.unfinished}", lost="its last number may not be whole")
 
     def _fits(self, block: bytes, cells: int, rows: int) -> bool:
         """Whether rows of so many cells are as the header has them, or with one more that is empty."""
