@@ -29,7 +29,7 @@ from nineaudit.readers import asc_lines, can_frames, text_log
 from nineaudit.readers.asc_dates import date_of
 from nineaudit.readers.asc_lines import STAMP
 from nineaudit.readers.can_frames import Frames
-from nineaudit.readers.text_layouts import Columns, read_lines
+from nineaudit.readers.text_layouts import MOST_SECONDS, Columns, read_lines
 from nineaudit.readers.text_log import NOT_READ, Account
 from nineaudit.signals import can_origin
 
@@ -64,6 +64,7 @@ _EVENTS: Final = (
 class _Log:
     """What is known of a log so far: how to read its lines, and what its header said."""
 
+    path: Path
     line: int = 1
     base: int = 16
     relative: bool = False
@@ -93,7 +94,7 @@ def read_asc(path: Path) -> Frames:
     Time in ns since the start of the measurement. Damage: lines that are neither frames nor of a known kind, a last
     line without line end. Raises RecordingError where there is not one frame.
     """
-    log = _Log()
+    log = _Log(path)
     parts: list[Frames] = []
     for block in text_log.blocks(path):
         if not block.endswith(b"\n") and _END.fullmatch(block):
@@ -159,6 +160,8 @@ def _accumulate(log: _Log, columns: Columns, stamped: Any) -> None:
     """Stamps from line to line become stamps from the start, exactly."""
     rows = np.flatnonzero(stamped)
     if len(rows):
+        if log.now / 1e9 + (columns.time[rows] / 1e9).sum() > MOST_SECONDS:
+            raise RecordingError("time stamps from line to line add up to more than 285 years", file=log.path)
         columns.time[rows] = log.now + np.cumsum(columns.time[rows])
         log.now = int(columns.time[rows[-1]])
 

@@ -23,7 +23,7 @@ from nineaudit.readers.text_layouts import Layout
 
 SIZES: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 """Bytes of an FD frame by data length code, ISO 11898-1."""
-STAMP: Final = rb"\s*(?P<s>\d{1,10})[.,](?P<f>\d{1,12})\s+"
+STAMP: Final = rb"\s*(?P<s>\d{1,9})[.,](?P<f>\d{1,12})\s+"
 _BYTE: Final = {16: rb"[0-9A-Fa-f]{2}", 10: rb"\d{1,3}"}
 _FLAG_REMOTE: Final = 1 << 4
 _FLAG_FD: Final = 1 << 12

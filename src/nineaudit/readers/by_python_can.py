@@ -97,7 +97,7 @@ def _trc_frame(message: Any, text: str, column: int, rows: Rows, account: Accoun
     time = exact(words[column], 10**6) if column < len(words) else None
     code, data = message.dlc, bytes(message.data)
     size = (SIZES[code] if message.is_fd else min(code, SHORT)) if 0 <= code < len(SIZES) else -1
-    if time is None or not known_key(message):
+    if time is None or not known_key(message) or not rows.knows(str(message.channel)):
         account.damaged(NOT_READ, number, text.encode())
     elif size < 0 or (not message.is_remote_frame and len(data) != size):
         account.damaged(WRONG, number, text.encode())

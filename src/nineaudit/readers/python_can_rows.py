@@ -11,6 +11,7 @@ import numpy as np
 from nineaudit.can_database import EXTENDED
 from nineaudit.readers import can_frames
 from nineaudit.readers.can_frames import ERROR, ERROR_STATE, FD, LONG, RATE_SWITCH, REMOTE, SHORT, Frames
+from nineaudit.readers.text_layouts import MOST_BUSES
 from nineaudit.readers.text_log import NOT_READ, Account
 
 SIZES: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
@@ -24,10 +25,14 @@ class Rows:
 
     def __init__(self) -> None:
         self.time = array("q")
-        self._key, self._bus, self._kind, self._length = array("L"), array("H"), array("B"), array("B")
+        self._key, self._bus, self._kind, self._length = array("I"), array("H"), array("B"), array("B")
         self._data, self._long = bytearray(), bytearray()
         self._long_rows = array("q")
         self._buses: dict[str, int] = {}
+
+    def knows(self, bus: str) -> bool:
+        """Whether there is room for that bus in the table."""
+        return bus in self._buses or len(self._buses) < MOST_BUSES
 
     def add(self, time: int, key: int, bus: str, kind: int, length: int, data: bytes) -> None:
         """One more frame; an error frame has no identifier."""
@@ -36,7 +41,7 @@ class Rows:
             self._long += data.ljust(LONG, b"\0")
         self.time.append(time)
         self._key.append(0 if kind & ERROR else key)
-        self._bus.append(self._buses.setdefault(bus, len(self._buses)) & 0xFFFF)
+        self._bus.append(self._buses.setdefault(bus, len(self._buses)))
         self._kind.append(kind)
         self._length.append(length)
         self._data += data[:SHORT].ljust(SHORT, b"\0")

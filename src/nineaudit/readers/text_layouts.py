@@ -23,6 +23,9 @@ Span = tuple[int, int]
 
 LONGEST: Final = 1024
 """Characters of a line that can be a frame; the longest of any format here is half as long."""
+MOST_SECONDS: Final = 9_000_000_000
+"""2^63 ns are a little more."""
+MOST_BUSES: Final = 256
 _ROWS: Final = 4096
 """Lines of a matrix: it stays in the processor's cache."""
 _FEW: Final = 4
@@ -131,23 +134,24 @@ def _read_alike(
     chars = np.ascontiguousarray(view[begin].view(np.uint8).reshape(-1, size).T)
     todo = np.arange(len(rows))
     while True:
-        passed, layout = _first(chars, todo, parse)
+        passed, layout = _first(chars, todo, parse, buses)
         if layout is None:
             return
         todo = todo[passed:]
         same = _same(chars, todo[0], layout)[todo]
         alike, left = todo[same], todo[~same]
         wrong = _take(chars, alike, rows, layout, buses.setdefault(layout.bus, len(buses)), columns)
+        wrong = wrong[wrong != todo[0]]  # whose layout it is, yet its number is too large: no frame
         todo = np.sort(np.r_[left, wrong]) if len(wrong) else left
         if len(todo) < len(rows) // _FEW:
             chars, rows, todo = np.take(chars, todo, axis=1), rows[todo], np.arange(len(todo))
 
 
-def _first(chars: ByteMatrix, todo: Rows, parse: Parse) -> tuple[int, Layout | None]:
+def _first(chars: ByteMatrix, todo: Rows, parse: Parse, buses: dict[str, int]) -> tuple[int, Layout | None]:
     """How many of the lines `todo` are no frames before the first that is one, and its layout."""
     for passed, place in enumerate(todo.tolist()):
         layout = parse(chars[:, place].tobytes())
-        if layout is not None:
+        if layout is not None and (layout.bus in buses or len(buses) < MOST_BUSES):
             return passed, layout
     return len(todo), None
 
@@ -186,7 +190,9 @@ def _numbers(pick: Callable[[Any], ByteMatrix], layout: Layout, fine: BoolArray)
     """(n,) ns, (n,) keys, (bytes, n) data; `fine` (n,) loses the lines that have no digits where they belong."""
     start, end = layout.fraction
     parts = _decimal(pick(slice(start, min(end, start + _NANO))), fine)
-    time = _decimal(pick(slice(*layout.seconds)), fine) * 10**_NANO + parts * 10 ** max(_NANO - (end - start), 0)
+    seconds = _decimal(pick(slice(*layout.seconds)), fine)
+    fine &= seconds < MOST_SECONDS
+    time = seconds * 10**_NANO + parts * 10 ** max(_NANO - (end - start), 0)
     key = np.full(len(time), layout.key, dtype=np.int64)
     if layout.octets is not None:
         return time, key, np.frombuffer(layout.octets, dtype=np.uint8)[:, None]
