@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from nineaudit.array import FloatArray
+from nineaudit.array import FloatArray, frozen
+from nineaudit.bus import Bus, Identifier
 from nineaudit.cli import app
 from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.parts import Part, files, recordings
-from nineaudit.readers import read
-from nineaudit.recording import Recording
+from nineaudit.readers import Contents, read
+from nineaudit.readers.joined import join
+from nineaudit.recording import Recording, Source, Trace
 from nineaudit.report import result_schema
 from nineaudit.rig import Rig, parse_rig
 from nineaudit.writers import write_recording
@@ -164,6 +166,26 @@ def test_an_original_is_never_written_to(tmp_path: Path) -> None:
     for path in made:
         with pytest.raises(ConfigurationError, match="the original recording is never overwritten"):
             write_recording(found, path, force=True)
+
+
+def test_buses_of_several_logs_keep_their_names(tmp_path: Path) -> None:
+    """Rules of the bus see every log: identifiers and loads of each, restarts added, absent what came in none."""
+    made, t = three(tmp_path), np.arange(100) / 100
+
+    def log(path: Path, seen: Rig) -> tuple[Contents, Source]:
+        group = path.stem[-1]
+        identifier = Identifier(0x24, None, "0", True, 100, 0.0, 1.0, 0.01, 0.0, 0.01, False)
+        absent = {"a": ("P", "Q"), "b": ("Q", "R"), "w": ()}[group]
+        bus = Bus((identifier,), absent, 1, {"a": 0.5, "b": 0.25, "w": 0.75}[group], (), 5e5, False)
+        traces = tuple(Trace(s.channel, s.signal, frozen(t), frozen(t)) for s in seen.array.sensors)
+        return Contents(traces, bus=None if group == "w" else bus), Source(path, "blf", "", 0, counts={"frames": 100})
+
+    joined = join(made, rig(), log)
+    bus = joined.contents.bus
+    assert bus is not None
+    assert [x.bus for x in bus.identifiers] == ["T1_a.csv 0", "T1_b.csv 0"]
+    assert (bus.absent, bus.restarts, bus.first_restart, bus.bit_rate) == (("Q",), 2, 0.25, 5e5)
+    assert joined.source.counts == {"frames": 300}
 
 
 # --- which file is which ------------------------------------------------------------------------------------------

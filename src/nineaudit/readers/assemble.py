@@ -13,7 +13,7 @@ from nineaudit.errors import RecordingError
 from nineaudit.readers import alignment
 from nineaudit.readers.clock import clock_of, in_order
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.resample import resample
+from nineaudit.readers.resample import resample_columns
 from nineaudit.recording import Alignment, Clock, Recording, Source, Trace
 from nineaudit.signals import si_factor
 
@@ -88,17 +88,36 @@ def _on_one_base(
     u_parts: Mapping[str, float],
 ) -> tuple[list[FloatArray], tuple[Alignment, ...]]:
     """The readings of every trace at `time`, stamps of `native[base]`, and how those came there that have others."""
-    columns, alignments = [], []
-    for trace, clock in zip(native, clocks, strict=True):
-        if np.array_equal(trace.time, native[base].time):
-            columns.append(trace.values[np.searchsorted(trace.time, time)])
+    columns: list[FloatArray] = [np.empty(0)] * len(native)
+    alignments: dict[int, Alignment] = {}
+    for members in _messages(native):
+        first, clock = native[members[0]], clocks[members[0]]
+        if np.array_equal(first.time, native[base].time):
+            for i in members:
+                columns[i] = native[i].values[np.searchsorted(first.time, time)]
             continue
-        _require_overlap(time, trace, source)
-        values, error = resample(time, trace, clock, clocks[base].rate)
-        columns.append(values)
-        u_part = u_parts.get(trace.channel)
-        alignments.append(alignment.align(trace, clock, native[base], clocks[base], error, u_part))
-    return columns, tuple(alignments)
+        _require_overlap(time, first, source)
+        together = np.column_stack([native[i].values for i in members])
+        values, errors = resample_columns(time, first.time, together, clock, clocks[base].rate)
+        for i, column, error in zip(members, values.T, errors.tolist(), strict=True):
+            u_part = u_parts.get(native[i].channel)
+            columns[i] = column
+            alignments[i] = alignment.align(native[i], clock, native[base], clocks[base], error, u_part)
+    return columns, tuple(alignments[i] for i in sorted(alignments))
+
+
+def _messages(native: Sequence[Trace]) -> list[list[int]]:
+    """Columns of the traces that have all stamps in common, and the samples that are not valid."""
+    alike: list[list[int]] = []
+    for i, trace in enumerate(native):
+        home = next((members for members in alike if _same_samples(native[members[0]], trace)), None)
+        alike.append([i]) if home is None else home.append(i)
+    return alike
+
+
+def _same_samples(one: Trace, other: Trace) -> bool:
+    same = np.array_equal(one.time, other.time)
+    return same and np.array_equal(np.isfinite(one.values), np.isfinite(other.values))
 
 
 def _si_units(rig: Rig) -> dict[str, str]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nineaudit.array import frozen
+from nineaudit.bus import Bus
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.offset import Offset, find_offset
@@ -61,7 +62,26 @@ def join(paths: Sequence[Path], rig: Rig, read_file: ReadFile) -> Joined:
         parts=tuple(sources),
     )
     u = {c: o.u for part, o in zip(rig.parts, offsets, strict=True) for c in part.channels}
-    return Joined(Contents(tuple(traces)), whole, u)
+    buses = {path.name: found.bus for path, (found, _) in zip(paths, read, strict=True) if found.bus is not None}
+    return Joined(Contents(tuple(traces), bus=_bus(buses)), whole, u)
+
+
+def _bus(buses: Mapping[str, Bus]) -> Bus | None:
+    """The bus of the log among the parts; of several logs all buses, each with its file before its name."""
+    logs = list(buses.values())
+    if len(logs) < 2:
+        return logs[0] if logs else None
+    starts = [bus.first_restart for bus in logs if bus.first_restart is not None]
+    rates = {bus.bit_rate for bus in logs}
+    return Bus(
+        identifiers=tuple(replace(x, bus=f"{name} {x.bus}") for name, bus in buses.items() for x in bus.identifiers),
+        absent=tuple(name for name in logs[0].absent if all(name in bus.absent for bus in logs)),
+        restarts=sum(bus.restarts for bus in logs),
+        first_restart=min(starts, default=None),
+        loads=tuple(replace(x, bus=f"{name} {x.bus}") for name, bus in buses.items() for x in bus.loads),
+        bit_rate=rates.pop() if len(rates) == 1 else None,
+        fd=any(bus.fd for bus in logs),
+    )
 
 
 def _seen_by(part: Part, rig: Rig) -> Rig:

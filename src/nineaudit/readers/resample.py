@@ -17,13 +17,12 @@ steps that differ by a quarter. In the first interval of a run it is less than h
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nineaudit.array import BoolArray, FloatArray, frozen
+from nineaudit.array import BoolArray, FloatArray
 from nineaudit.readers.clock import reach
 from nineaudit.recording import Clock, Trace
 
@@ -48,29 +47,40 @@ def resample(time: FloatArray, trace: Trace, clock: Clock, rate: float) -> tuple
     outside. On a sample's own stamp its value, unless the trace is more than FASTER than the clock: then what is
     above 0.4 to 0.5 of `rate` is taken away first. The error is that of the recorded spectrum (see expected_error).
     """
-    interval = 1.0 / clock.rate
-    even = list(_runs(trace, interval))
+    values, errors = resample_columns(time, trace.time, trace.values[:, None], clock, rate)
+    return values[:, 0], float(errors[0])
+
+
+def resample_columns(
+    time: FloatArray, stamps: FloatArray, columns: FloatArray, clock: Clock, rate: float
+) -> tuple[FloatArray, FloatArray]:
+    """((n,k) values, (k,) errors) as resample(), of channels of one message: `stamps` (m,) s, `columns` (m,k), the same
+    samples of each valid."""
+    interval, valid = 1.0 / clock.rate, np.isfinite(columns[:, 0])
+    even = list(_runs(stamps, valid, interval))
     if clock.rate > FASTER * rate:
-        trace = _low_passed(trace, even, rate / clock.rate)
-    left, phase, values = _between(time, trace, reach(clock))
-    inner = np.isfinite(values) & (phase > 0) & (phase < 1)
+        columns = _low_passed(columns, even, rate / clock.rate)
+    left, phase, values = _between(time, stamps, columns, reach(clock))
+    seen = np.isfinite(values[:, 0])
+    inner = seen & (phase > 0) & (phase < 1)
     splined = np.zeros(time.size, dtype=np.bool_)
     for run in even:
         here = inner & _within(left, run)
-        values[here] = _spline(trace, run, interval, time[here])
+        values[here] = _spline(stamps[run], columns[run], interval, time[here])
         splined |= here & _within(left, slice(run.start + 1, run.stop - 1))
-    return values, expected_error(trace, phase[np.isfinite(values)], splined[np.isfinite(values)])
+    errors = [expected_error(column, phase[seen], splined[seen]) for column in columns.T]
+    return values, np.array(errors)
 
 
-def expected_error(trace: Trace, phase: FloatArray, splined: BoolArray) -> float:
-    """Root mean square error of interpolated values, in the unit of the trace, from its own spectrum.
+def expected_error(samples: FloatArray, phase: FloatArray, splined: BoolArray) -> float:
+    """Root mean square error of values that are interpolated between `samples` (m,), from their own spectrum.
 
     `phase` (n,) 0..1: where between two samples each value was taken, `splined` (n,) within a run; others count as on
     the line between the two samples. √∫ S(f) E²(f) df, S the one-sided spectral density over the share f of the
     sampling rate (Welch), E² the squared_error averaged over the phases. What was above half the sampling rate before
     it was sampled is folded in and cannot be told: it is not in this error. Noise near the Nyquist frequency is.
     """
-    share, density = _spectrum(trace.values)
+    share, density = _spectrum(samples)
     total = np.zeros_like(share)
     for degree, chosen in ((DEGREE, splined), (1, ~splined)):
         total += _mean_square(share, phase[chosen], degree) * np.count_nonzero(chosen)
@@ -114,10 +124,9 @@ def _spectrum(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(share), np.asarray(density)
 
 
-def _runs(trace: Trace, interval: float) -> Iterator[slice]:
+def _runs(stamps: FloatArray, valid: BoolArray, interval: float) -> Iterator[slice]:
     """Stretches of SHORTEST_RUN and more valid samples whose steps are even."""
-    valid = np.isfinite(trace.values)
-    even = np.abs(np.diff(trace.time) - interval) <= EVEN * interval
+    even = np.abs(np.diff(stamps) - interval) <= EVEN * interval
     ends = np.flatnonzero(~(even & valid[1:] & valid[:-1]))
     for first, last in zip(np.r_[-1, ends] + 1, np.r_[ends, valid.size - 1], strict=True):
         if last - first + 1 >= SHORTEST_RUN:
@@ -128,41 +137,44 @@ def _within(left: NDArray[np.intp], run: slice) -> BoolArray:
     return np.asarray((left >= run.start) & (left < run.stop - 1))
 
 
-def _between(time: FloatArray, trace: Trace, furthest: float) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
-    """((n,) sample before, (n,) part of the interval after it, (n,) value on the line between the two)."""
-    right = np.clip(np.searchsorted(trace.time, time), 1, trace.time.size - 1)
+def _between(
+    time: FloatArray, stamps: FloatArray, columns: FloatArray, furthest: float
+) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+    """((n,) sample before, (n,) part of the interval after it, (n,k) values on the line between the two)."""
+    right = np.clip(np.searchsorted(stamps, time), 1, stamps.size - 1)
     left = right - 1
-    step = trace.time[right] - trace.time[left]
-    phase = (time - trace.time[left]) / step
-    low, high = trace.values[left], trace.values[right]
-    inside = (phase >= 0) & (phase <= 1) & (step <= furthest)
-    values = np.where(inside, low + phase * (high - low), np.nan)
-    return left, phase, np.where(phase == 0, low, np.where(phase == 1, high, values))
+    step = stamps[right] - stamps[left]
+    phase = (time - stamps[left]) / step
+    low, high = columns[left], columns[right]
+    values = low + phase[:, None] * (high - low)
+    values[(phase < 0) | (phase > 1) | (step > furthest)] = np.nan
+    values[phase == 0], values[phase == 1] = low[phase == 0], high[phase == 1]
+    return left, phase, values
 
 
-def _spline(trace: Trace, run: slice, interval: float, time: FloatArray) -> FloatArray:
-    """Values of the spline through a run, at stamps within it."""
+def _spline(stamps: FloatArray, columns: FloatArray, interval: float, time: FloatArray) -> FloatArray:
+    """(n,k) values of the splines through a run (m,k), at stamps within it."""
     from scipy.interpolate import make_interp_spline
 
-    start = trace.time[run.start]
-    at = _reflected((trace.time[run] - start) / interval, _REFLECTED)
-    found = make_interp_spline(at, _reflected(trace.values[run], _REFLECTED), k=DEGREE)
-    return np.asarray(found((time - start) / interval), dtype=np.float64)
+    at = _reflected((stamps - stamps[0]) / interval, _REFLECTED)
+    found = make_interp_spline(at, _reflected(columns, _REFLECTED), k=DEGREE)
+    return np.asarray(found((time - stamps[0]) / interval), dtype=np.float64)
 
 
 def _reflected(values: FloatArray, count: int) -> FloatArray:
-    """Continued at both ends by point reflection: value and slope go on."""
-    return np.asarray(np.pad(values, count, mode="reflect", reflect_type="odd"))
+    """Continued at both ends by point reflection: value and slope go on. Along the first axis."""
+    beyond = [(count, count)] + [(0, 0)] * (values.ndim - 1)
+    return np.asarray(np.pad(values, beyond, mode="reflect", reflect_type="odd"))
 
 
-def _low_passed(trace: Trace, even: list[slice], ratio: float) -> Trace:
-    """Without what a clock of `ratio` times the trace's rate cannot hold: a linear-phase filter, run by run."""
+def _low_passed(columns: FloatArray, even: list[slice], ratio: float) -> FloatArray:
+    """Without what a clock of `ratio` times their rate cannot hold: a linear-phase filter, run by run."""
     from scipy.signal import firwin, kaiserord, oaconvolve
 
     count, beta = kaiserord(_ATTENUATION, 2.0 * (_STOP - _PASS) * ratio)
     count += 1 - count % 2
-    taps = firwin(count, (_PASS + _STOP) * ratio, window=("kaiser", beta))
-    values = trace.values.copy()
+    taps = firwin(count, (_PASS + _STOP) * ratio, window=("kaiser", beta))[:, None]
+    values = columns.copy()
     for run in even:
-        values[run] = oaconvolve(_reflected(trace.values[run], count // 2), taps, mode="valid")
-    return replace(trace, values=frozen(values))
+        values[run] = oaconvolve(_reflected(columns[run], count // 2), taps, mode="valid", axes=0)
+    return values
