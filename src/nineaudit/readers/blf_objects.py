@@ -104,7 +104,7 @@ def _classic(group: Group) -> Found:
 
 def _cut(data: Words, length: NDArray[np.uint8]) -> Words:
     """Words of which only so many bytes are data, the rest zero."""
-    return data.copy() if length.min(initial=SHORT) == SHORT else data & _KEEP_FIRST.take(length)
+    return data if length.min(initial=SHORT) == SHORT else data & _KEEP_FIRST.take(length)
 
 
 def _sent(flags: NDArray[np.uint8], group: Group) -> NDArray[np.uint8]:
