@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import gzip
 import random
 from pathlib import Path
 
@@ -208,9 +209,9 @@ def test_labelled_rows_of_a_crash_recorder(tmp_path: Path) -> None:
 
 def test_units_in_brackets_and_key_value_lines(tmp_path: Path) -> None:
     """Names with units in brackets (DIAdem, enDAQ), lines of Key: Value above."""
-    found = contents(tmp_path, "Title: x\nSamplerate [Hz],100\n\nTime [s],p [g],q (m/s²)\n" + rows())
+    found = contents(tmp_path, "Title: x\nSamplerate [Hz],100\n\nTime [s],p [m/(s^2)],q (m/s²)\n" + rows())
     same(found)
-    assert [t.unit for t in found.traces] == ["g", "m/s²"]
+    assert [t.unit for t in found.traces] == ["m/(s^2)", "m/s²"]
 
 
 def test_a_row_of_units_below_the_names(tmp_path: Path) -> None:
@@ -218,6 +219,22 @@ def test_a_row_of_units_below_the_names(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.traces[0].values, P)
     np.testing.assert_allclose(found.traces[0].time, np.arange(COUNT) / 100 * 1e-3, rtol=1e-15)
     assert [t.unit for t in found.traces] == ["g", None]
+
+
+def test_an_export_for_a_spreadsheet(tmp_path: Path) -> None:
+    """`sep=,` first, units below the names, a separator at the end of every row (Shimmer)."""
+    found = contents(tmp_path, '"sep=,"\nTime,p,q,\ns,m/(s^2),m/(s^2),\n' + rows(pattern="{t},{p},{q},\n"))
+    same(found)
+    assert [t.unit for t in found.traces] == ["m/(s^2)", "m/(s^2)"]
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("name", ["t.csv", "t.csv.gz"])
+def test_a_packed_table_is_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(gzip.compress(("t_s,p,q\n" + rows()).encode()))
+    with pytest.raises(RecordingError, match=r"gzip archive.*unpack it|unknown kind of file; found '\.gz'"):
+        read(path, RIG)
 
 
 def test_a_name_with_a_range_in_brackets_is_no_unit(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ FACTORS: Final[dict[Quantity, dict[str, float]]] = {
 # Spellings met in databases and exports, folded to one of the names above.
 _SPELLINGS = {
     "m/s2": "m/s^2", "m/s²": "m/s^2", "m/s/s": "m/s^2", "m/sec^2": "m/s^2", "meter/sec2": "m/s^2",
+    "m/(s^2)": "m/s^2", "m/(s*s)": "m/s^2",
     "g": "g_0", "gn": "g_0", "g0": "g_0", "°/s": "deg/s", "degree/s": "deg/s", "degrees/s": "deg/s",
     "dps": "deg/s", "deg/sec": "deg/s", "rad/sec": "rad/s", "rps": "rad/s", "sec": "s", "second": "s",
     "seconds": "s", "msec": "ms", "µs": "us", "μs": "us", "inch": "in",

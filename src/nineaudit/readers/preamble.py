@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 from nineaudit.array import Kind
 from nineaudit.errors import ConfigurationError
-from nineaudit.readers.dialect import Dialect, is_number
+from nineaudit.readers.dialect import Dialect, base, is_number
 from nineaudit.signals import QUANTITY
 from nineaudit.units import FACTORS, Quantity, factor
 
@@ -100,8 +100,8 @@ def surroundings(table: Dialect, time: int | None, channels: Sequence[int], rig:
 
 def unit_in_name(name: str, kind: Kind) -> str | None:
     """The unit in brackets that ends the name of a column, None where it is none of that quantity."""
-    found = re.search(r"[\[(]([^\[\]()]*)[\])]$", name)
-    return found[1].strip() if found and _is_unit(found[1], QUANTITY[kind]) else None
+    unit = _bare(name.removeprefix(base(name)).strip())
+    return unit if unit and _is_unit(unit, QUANTITY[kind]) else None
 
 
 def _rows_below(table: Dialect) -> Iterator[tuple[str, list[str], int]]:
@@ -143,13 +143,19 @@ def _units_above(table: Dialect, wanted: Sequence[int], rig: Rig) -> dict[int, s
 
 def _stated(cells: Sequence[str], wanted: Sequence[int]) -> dict[int, str]:
     """Units by column, without their brackets; a dash, a number and nothing are none."""
-    bare = {i: cells[i].strip("[]() ") for i in wanted if i < len(cells)}
+    bare = {i: _bare(cells[i]) for i in wanted if i < len(cells)}
     return {i: unit for i, unit in bare.items() if unit.strip("-") and not is_number(unit)}
+
+
+def _bare(cell: str) -> str:
+    """A unit without the brackets around it."""
+    found = re.fullmatch(r"\[(.*)\]|\((.*)\)", cell)
+    return (found[1] or found[2] or "").strip() if found else cell
 
 
 def _is_any_unit(cell: str, rig: Rig) -> bool:
     names = (rig.units.acceleration, rig.units.angular_rate)
-    return cell in names or any(_is_unit(cell.strip("[]() "), quantity) for quantity in FACTORS)
+    return cell in names or any(_is_unit(_bare(cell), quantity) for quantity in FACTORS)
 
 
 def _is_unit(text: str, quantity: Quantity) -> bool:
