@@ -23,8 +23,10 @@ class Column(NamedTuple):
 
     def floats(self) -> FloatArray:
         """(n,) float64, NaN where there is none."""
-        out = self.values.astype(np.float64)
-        out[~self.there] = np.nan
+        if self.there.all():
+            return self.values.astype(np.float64)
+        out = np.full(len(self.values), np.nan)
+        out[self.there] = self.values[self.there]
         return out
 
 

@@ -48,12 +48,16 @@ def read_mcap(path: Path, rig: Rig) -> Contents:
     places = [_place(sensor.signal, sensor.channel, topics) for sensor in rig.array.sensors]
     used = {topic: _streams(topics, topic) for topic in dict.fromkeys(topic for topic, _ in places)}
     clocks, notes = _clocks(used, rig, book.origin)
-    traces = [
-        Trace(sensor.channel, f"{topic}:{name}", clocks[topic], frozen(_values(used[topic], name)))
-        for sensor, (topic, name) in zip(rig.array.sensors, places, strict=True)
-    ]
-    counts = _counts(book, topics, used) | {"invalid_values": sum(int(np.isnan(t.values).sum()) for t in traces)}
-    return Contents(tuple(traces), counts, (*notes, *_notes(book, used)), book.damages.all())
+    traces = []
+    for sensor, (topic, name) in zip(rig.array.sensors, places, strict=True):
+        time, timed = clocks[topic]
+        values = frozen(_values(used[topic], name)[timed])
+        traces.append(Trace(sensor.channel, f"{topic}:{name}", frozen(time[timed]), values))
+    counts = _counts(book, topics, used) | {
+        "messages_without_time": sum(int(np.count_nonzero(~timed)) for _, timed in clocks.values()),
+        "invalid_values": sum(int(np.count_nonzero(np.isnan(t.values))) for t in traces),
+    }
+    return Contents(tuple(traces), counts, (*notes, *_notes(book, rig, used)), book.damages.all())
 
 
 def _mapped(path: Path) -> memoryview:
@@ -130,12 +134,12 @@ def _values(streams: Sequence[Stream], name: str) -> FloatArray:
     return found
 
 
-def _clocks(used: dict[str, list[Stream]], rig: Rig, origin: int) -> tuple[dict[str, FloatArray], tuple[str, ...]]:
-    """(m,) s of each topic's messages. Dates count from the earliest of them, which the note says."""
+def _clocks(used: dict[str, list[Stream]], rig: Rig, origin: int) -> tuple[dict[str, Column], tuple[str, ...]]:
+    """(m,) s of each topic's messages, and which have a time. Dates count from the earliest, which the note says."""
     stamps = {topic: _topic_stamps(streams, rig, origin) for topic, streams in used.items()}
     dates = {topic: _first_ns(stamp) for topic, stamp in stamps.items() if _first_ns(stamp) > _EPOCH_NS}
     base = min(dates.values(), default=0)
-    clocks = {topic: frozen(_seconds(stamp, base if topic in dates else 0)) for topic, stamp in stamps.items()}
+    clocks = {topic: _seconds(stamp, base if topic in dates else 0) for topic, stamp in stamps.items()}
     return clocks, (f"time counts from log time {base} ns",) if base else ()
 
 
@@ -170,11 +174,9 @@ def _first_ns(stamps: Column) -> int:
     return int(found.min(initial=2**62) * (1 if found.dtype.kind == "i" else 1e9)) if len(found) else 0
 
 
-def _seconds(stamps: Column, base: int) -> FloatArray:
+def _seconds(stamps: Column, base: int) -> Column:
     whole = stamps.values.dtype.kind == "i"
-    seconds = np.asarray((stamps.values - base) * 1e-9 if whole else stamps.values - base * 1e-9)
-    seconds[~stamps.there] = np.nan
-    return seconds
+    return Column((stamps.values - base) * 1e-9 if whole else stamps.values - base * 1e-9, stamps.there)
 
 
 def _counts(book: Book, topics: Topics, used: dict[str, list[Stream]]) -> dict[str, float]:
@@ -190,8 +192,11 @@ def _counts(book: Book, topics: Topics, used: dict[str, list[Stream]]) -> dict[s
     }
 
 
-def _notes(book: Book, used: dict[str, list[Stream]]) -> list[str]:
+def _notes(book: Book, rig: Rig, used: dict[str, list[Stream]]) -> list[str]:
     notes = [f"topic {topic} comes on {len(s)} channels" for topic, s in used.items() if len(s) > 1]
+    unstamped = [topic for topic, streams in used.items() if rig.time_signal and not all(s.stamp for s in streams)]
+    if unstamped:
+        notes.append(f"no time signal {rig.time_signal!r} in topic {', '.join(unstamped)}: the log times are taken")
     if book.unchecked:
         notes.append(f"{book.unchecked} of {book.chunks} chunks carry no checksum (CRC)")
     return notes

@@ -67,15 +67,16 @@ def _data_section(data: memoryview, last: Summary, book: Book) -> Iterator[Recor
     """Records of the data section. A record that cannot be, or that runs over the beginning of a chunk, is damage."""
     at = len(MAGIC)
     while at < last.end:
-        following = next(iter(last.chunks[bisect_right(last.chunks, at) :]), None)
+        behind = bisect_right(last.chunks, at)
+        limit = last.chunks[behind] if behind < len(last.chunks) else last.end
         try:
-            record = parse.record_at(data, at, following or last.end)
-            _require_possible(record, at in last.chunks)
+            record = parse.record_at(data, at, limit)
+            _require_possible(record, last, chunk=behind > 0 and last.chunks[behind - 1] == at)
         except Malformed as error:
-            if following is None and not last.whole:
+            if limit == last.end and not last.whole:
                 break
-            book.damages.add(f"data section: {error}", at, lost=_indexed(data, at, following or last.end))
-            at = following or last.end
+            book.damages.add(f"data section: {error}", at, lost=_indexed(data, at, limit))
+            at = limit
             continue
         at = record.end
         if record.op in (parse.DATA_END, parse.FOOTER):
@@ -91,11 +92,13 @@ def _data_section(data: memoryview, last: Summary, book: Book) -> Iterator[Recor
 _CUT: Final = "the file is cut short, or was never closed: it has no footer"
 
 
-def _require_possible(record: Record, chunk: bool) -> None:
+def _require_possible(record: Record, last: Summary, *, chunk: bool) -> None:
     if record.op == 0:
         raise Malformed("a record of opcode 0")
     if chunk and record.op != parse.CHUNK:
         raise Malformed("no chunk where the summary says that one begins")
+    if last.whole and last.good and record.op in (parse.DATA_END, parse.FOOTER) and record.end != last.end:
+        raise Malformed("its end record is not where the summary begins")
 
 
 def _indexed(data: memoryview, at: int, end: int) -> int | None:
@@ -115,8 +118,6 @@ def _end(data: memoryview, record: Record, last: Summary, book: Book) -> None:
     if record.op == parse.FOOTER:
         book.damages.add("the data section has no end record", record.at, words="its checksum is not there")
         return
-    if last.whole and last.good and record.end != last.end:
-        book.damages.add("bytes between data section and summary", record.end, lost=None)
     try:
         crc = parse.data_end(data, record)
     except Malformed as error:

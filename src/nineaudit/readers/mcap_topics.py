@@ -65,7 +65,6 @@ class Stream:
 
 
 Key = tuple[Channel, Schema | None]
-_NEW: Final = Stream("", Json(), [])
 
 
 @dataclass
@@ -85,8 +84,9 @@ class Topics:
             return True
         if not self.bare or channel.encoding not in READABLE:
             return False
-        stream = self.streams.get(self.key(channel), _NEW)
-        return stream is _NEW or (stream is not None and bool(stream.paths))
+        key = self.key(channel)
+        stream = self.streams.get(key)
+        return key not in self.streams or (stream is not None and bool(stream.paths))
 
     def key(self, channel: Channel) -> Key:
         """A channel with its schema: messages of an id that is defined anew are another stream."""
