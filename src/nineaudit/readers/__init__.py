@@ -51,6 +51,9 @@ _MAGIC: Final = {
 _BINARY: Final = (".db", ".blf", ".mcap", ".mf4", ".parquet", ".zip")
 
 
+_UNPACK: Final = "unpack it and read what is in it"
+
+
 def _read_csv(path: Path, rig: Rig) -> Contents:
     """A table, or python-can's own CSV log, which its header gives away."""
     with path.open("rb") as file:
@@ -134,7 +137,7 @@ def _reader(path: Path) -> Reader:
             file=path,
             found=path.suffix or "no suffix",
             expected="one of " + " ".join(READERS),
-            advice=suggestion(suffix, READERS) if suffix else None,
+            advice=_UNPACK if suffix == ".gz" else suggestion(suffix, READERS) if suffix else None,
         )
     return READERS[suffix]
 
@@ -172,5 +175,5 @@ def _require_kind(path: Path, size: int) -> None:
 def _advice(found: tuple[str, str]) -> str | None:
     suffix, kind = found
     if kind == "a gzip archive":
-        return "unpack it and read what is in it"
+        return _UNPACK
     return f"rename it to {suffix}" if suffix not in ("", ".zip") else None
