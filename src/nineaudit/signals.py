@@ -28,7 +28,7 @@ def time_unit(name: str, stated: str | None) -> str | None:
 
 def can_origin(text: str) -> float:
     """Seconds that the note CAN_ORIGIN in `text` states, 0 without one."""
-    found = re.search(re.escape(CAN_ORIGIN).replace(r"\{\}", r"([-+0-9.eE]+)"), text)
+    found = re.search(re.escape(CAN_ORIGIN).replace(r"\{\}", r"([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"), text)
     return float(found[1]) if found else 0.0
 
 

@@ -34,8 +34,8 @@ HEAD: Final = np.dtype(
 BASE: Final = 16
 """Bytes of the part that all headers have."""
 PADDING: Final = 3
-LARGEST: Final = 1 << 26
-"""Bytes of the largest object, and of the largest content of a container, that is believed."""
+LARGEST: Final = 1 << 25
+"""Bytes of the largest object, and of the largest content of a container, that is believed; most have 128 KiB."""
 ROOM: Final = 128
 """Zero bytes behind a buffer, so that a record may be taken from any place in it."""
 _SIGNATURE: Final = np.uint32(int.from_bytes(b"LOBJ", "little"))

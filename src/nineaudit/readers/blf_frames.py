@@ -24,6 +24,8 @@ Sizes = NDArray[np.int64]
 _TENS, _NANOSECONDS = 1, 2
 _TEN_MICROSECONDS: Final = 10_000
 _MARKER: Final = 96
+_FARTHEST: Final = 4e9
+"""s that an origin can be from the stamps: they stay within int64 ns."""
 BEYOND: Final = 255
 """Code that stands for all types from 255 on, of which none is a CAN frame."""
 UNKNOWN_UNIT: Final = "frames stamped in a unit that is not known, read as ns"
@@ -92,7 +94,7 @@ def _origin(batch: Batch, rows: Rows) -> int:
     """ns of the first marker that states an origin (nineaudit's own logs do), 0 if none does."""
     for at, size in zip(batch.at[rows].tolist(), batch.heads["size"][rows].tolist(), strict=True):
         seconds = can_origin(batch.buffer[at : at + size].tobytes().decode("latin-1"))
-        if seconds and np.isfinite(seconds):
+        if seconds and abs(seconds) < _FARTHEST:
             return round(seconds * 1e9)
     return 0
 

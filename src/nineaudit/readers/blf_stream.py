@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import struct
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby
+from typing import Final
 
 import numpy as np
 
-from nineaudit.readers.blf_chain import ROOM, Bytes, Places, Records, follow
+from nineaudit.readers.blf_chain import BASE, LARGEST, ROOM, Bytes, Places, Records, follow
 from nineaudit.readers.blf_inflate import NOTHING_BEGINS, Piece
 from nineaudit.readers.losses import Losses
+
+_SIZE: Final = struct.Struct("<8xL4x")  # of an object, as blf_chain.HEAD has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +39,15 @@ class Batch:
 
 @dataclass
 class _Rest:
-    """Bytes that wait for more, and where they came from. `lost`: a container before them is lost, so that what does
-    not fit is no fault of its own."""
+    """Bytes that wait for more, until they are `needed` many, and where they came from. `lost`: a container before
+    them is lost, so that what does not fit is no fault of its own."""
 
     content: bytes = b""
     begins: tuple[int, ...] = ()
     files: tuple[tuple[int, bool], ...] = ()
     synced: bool = True
     lost: bool = False
+    needed: int = 0
 
 
 @dataclass
@@ -64,7 +69,7 @@ class Stream:
                     self.rest = _Rest(synced=False, lost=True)
                 elif bare:
                     yield from self._bare(part)
-                else:
+                elif not self._waits(part):
                     yield self._objects(part)
         yield self._objects([], last=True)
 
@@ -74,6 +79,17 @@ class Stream:
             if what:
                 lost = 0 if piece.content else piece.stored
                 self.losses.add(what, f"byte {piece.at}", count=not piece.again, lost=lost)
+
+    def _waits(self, pieces: list[Piece]) -> bool:
+        """Whether the object that waits for more still does: a stream is not searched again for every part of it."""
+        rest = self.rest
+        begins = np.cumsum([len(rest.content), *(len(piece.content) for piece in pieces)]).tolist()
+        if begins[-1] >= rest.needed:
+            return False
+        rest.content = b"".join([rest.content, *(piece.content for piece in pieces)])
+        rest.begins = (*rest.begins, *begins[:-1])
+        rest.files = (*rest.files, *((piece.at, False) for piece in pieces))
+        return True
 
     def _bare(self, pieces: list[Piece]) -> Iterator[Batch]:
         """Objects outside of containers, which are no part of the stream inside."""
@@ -111,7 +127,8 @@ class Stream:
     def _after(self, batch: Batch, content: bytes, tail: int, synced: bool) -> _Rest:
         first = max(bisect_right(batch.begins, tail) - 1, 0)
         begins = tuple(begin - tail for begin in batch.begins[first:])
-        return _Rest(content, begins, batch.files[first:], synced)
+        needed = min(_SIZE.unpack_from(content)[0], LARGEST) if synced and len(content) >= BASE else 0
+        return _Rest(content, begins, batch.files[first:], synced, needed=needed)
 
     def _book_gaps(self, batch: Batch, gaps: tuple[tuple[int, int], ...], before: _Rest) -> None:
         for begin, end in gaps:

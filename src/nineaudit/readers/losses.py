@@ -33,6 +33,6 @@ class Losses:
     def damage(self) -> tuple[Damage, ...]:
         """One Damage for each kind."""
         return tuple(
-            Damage(what, f.place, f.count, f"{f.lost} {self.unit} lost" if f.lost else "")
+            Damage(what, f.place, max(f.count, 1), f"{f.lost} {self.unit} lost" if f.lost else "")
             for what, f in self.faults.items()
         )
