@@ -303,7 +303,7 @@ def test_lines_of_asc(tmp_path: Path, line: str, row: Row) -> None:
         "0.1 CANFD 1 Rx 1A0 0 0 9 11 11 22 33 44 55 66 77 88 99 AA BB 1 1 1000",
         "0.1 CANFD 1 Rx 1A0 0 0 2 2 11 22 33", "0.1 CANFD 1 Rx 1A0 0 0 2 3 11 22 33 1 1 1000",
         "0.1 CANFD 1 Rx 1A0 0 2 2 2 11 22 1 1 1000", "0.1 CANFD 1 Rx 1A0 0 0 2 2 11 22 1 1 10Q0", "0.1 CANFE 1 Rx 1A0 0 0 0 0",
-        "0.1 CANFD 1 Rx 1A0 0 0 9 9 11 22 33 44 55 66 77 88 99 1 1 0",
+        "0.1 CANFD 1 Rx 1A0 \x02 0 0 2 2 11 22 1 1 1000", "0.1 CANFD 1 Rx 1A0 0 0 9 9 11 22 33 44 55 66 77 88 99 1 1 0",
     ],
     ids=lambda line: repr(line[:50]),
 )  # fmt: skip

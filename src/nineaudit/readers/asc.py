@@ -79,13 +79,21 @@ class _Log:
     buses: dict[str, int] = field(default_factory=dict)
     account: Account = field(default_factory=Account)
 
+    def changes(self, header: re.Match[bytes]) -> bool:
+        """Whether lines behind a line `base` are read otherwise than those before it."""
+        return self.relative or _numbers(header) != (self.base, self.relative)
+
     def begin(self, header: re.Match[bytes]) -> None:
         """From a line `base` on, its numbers and stamps hold."""
         self.headers += 1
-        self.base = 16 if header[1].lower() == b"hex" else 10
-        self.relative = (header[2] or b"").lower() == b"relative"
+        self.base, self.relative = _numbers(header)
         self.added |= self.relative
         self.now = 0
+
+
+def _numbers(header: re.Match[bytes]) -> tuple[int, bool]:
+    """Base of numbers, and whether stamps are relative."""
+    return 16 if header[1].lower() == b"hex" else 10, (header[2] or b"").lower() == b"relative"
 
 
 def read_asc(path: Path) -> Frames:
@@ -116,10 +124,12 @@ def read_asc(path: Path) -> Frames:
 def _parts(log: _Log, block: bytes) -> Iterator[Frames]:
     """Frames of a block, read anew in parts where lines `base` stand in it: how to read lines changes there."""
     read = _read(log, block)
-    cuts = [row for row, text in read[1] if _BASE.fullmatch(text)]
-    if not cuts:
+    headers = [(row, header) for row, text in read[1] if (header := _BASE.fullmatch(text))]
+    if not any(log.changes(header) for _, header in headers):
+        log.headers += len(headers)
         yield _part(log, block, *read)
         return
+    cuts = [row for row, _ in headers]
     lines, starts = block.split(b"\n"), sorted({0, *cuts})
     for start, end in zip(starts, [*starts[1:], len(lines) - 1], strict=True):
         if header := _BASE.fullmatch(lines[start]):

@@ -141,8 +141,8 @@ def _read_alike(
         same = _same(chars, todo[0], layout)[todo]
         alike, left = todo[same], todo[~same]
         wrong = _take(chars, alike, rows, layout, buses.setdefault(layout.bus, len(buses)), columns)
-        wrong = wrong[wrong != todo[0]]  # whose layout it is, yet its number is too large: no frame
-        todo = np.sort(np.r_[left, wrong]) if len(wrong) else left
+        left = np.sort(np.r_[left, wrong]) if len(wrong) else left
+        todo = left[left != todo[0]]  # it may be no frame in spite of its layout: its number is too large, say
         if len(todo) < len(rows) // _FEW:
             chars, rows, todo = np.take(chars, todo, axis=1), rows[todo], np.arange(len(todo))
 
