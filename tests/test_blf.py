@@ -484,6 +484,8 @@ def test_what_the_header_counts(tmp_path: Path) -> None:
     assert found.notes == ("the header counts 10 objects, 60 are there: the log was not closed, or appended to",)
     assert found.damage == ()
     assert (found.counts["objects"], found.counts["objects_in_header"]) == (60, 10)
+    found = read_bytes(tmp_path, made.log(made.container(b"".join(FRAMES)), objects=60, size=144))
+    assert found.notes == (f"the header states 144 bytes, the file has {(tmp_path / 'made.blf').stat().st_size}",)
 
 
 @pytest.mark.parametrize(

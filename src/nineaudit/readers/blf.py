@@ -48,7 +48,7 @@ def read_blf(path: Path, threads: int = 1) -> Frames:
     _check_header(header, size, account)
     log = columns.frames(
         counts=_counts(header, size, account),
-        notes=tuple(_notes(header, account)),
+        notes=tuple(_notes(header, size, account)),
         damage=losses.damage(),
         origin=account.origin,
     )
@@ -75,10 +75,12 @@ def _check_header(header: Header, size: int, account: Account) -> None:
         losses.add("the measurement's start is no date; times count from it", "byte 40")
 
 
-def _notes(header: Header, account: Account) -> Iterator[str]:
+def _notes(header: Header, size: int, account: Account) -> Iterator[str]:
     there = sum(account.types.values())
     if header.objects < there - account.types[_RESTORE_POINT]:
         yield f"the header counts {header.objects} objects, {there} are there: the log was not closed, or appended to"
+    if header.file_size < size:
+        yield f"the header states {header.file_size} bytes, the file has {size}"
     for what, count in sorted(account.odd.items()):
         if count:
             yield f"{count} {what}"
