@@ -149,6 +149,14 @@ def test_all_stamps_may_be_shifted(power: int) -> None:
     assert there.alignments[0].u_value == pytest.approx(here.alignments[0].u_value, rel=1e-3)
 
 
+def test_the_rate_is_that_of_the_time_base() -> None:
+    """A faster channel that was only on for a short time does not give it."""
+    base, t = np.arange(4000) / RATE, np.arange(500) / (10 * RATE) + 3.0
+    found = assembled(trace(base, np.sin(base)), trace(t, np.sin(t)))
+    assert found.resampled == ("q",)
+    assert found.rate == pytest.approx(RATE)
+
+
 # --- clocks -------------------------------------------------------------------------------------------------------
 
 

@@ -89,6 +89,19 @@ def test_the_time_base_is_while_every_part_was_recording(tmp_path: Path) -> None
     assert found.native[0].time[0] == 0.0
 
 
+def test_a_short_fast_part_gives_the_clock(tmp_path: Path) -> None:
+    """2 kHz for a second, the others for ten: the common second is at 2 kHz, though the others have more samples."""
+    made, motion = three(tmp_path), signals()
+    for path, rate in zip(made[1:], (500, 800), strict=True):
+        t = np.arange(-4, 6, 1 / rate)
+        write(path, t, motion(t))
+    found = read(made[0], rig())
+    assert found.rate == pytest.approx(2000)
+    assert found.resampled == ("bx", "by", "bz", "wx", "wy", "wz")
+    np.testing.assert_array_equal(found.time, found.native[0].time)
+    np.testing.assert_allclose(found.readings[:, 3:6], motion(found.time), atol=1e-4)
+
+
 def test_every_file_stands_in_the_source_with_its_hash(tmp_path: Path) -> None:
     made = three(tmp_path)
     before = [path.read_bytes() for path in made]

@@ -92,7 +92,7 @@ class Case:
     def sigma(self) -> FloatArray:
         """(k,) deviation of a reading in the fits: `noise`, and more for channels of other clocks (Alignment)."""
         found = self.noise.copy()
-        for a in self.recording.alignments:
+        for a in (a for a in self.recording.alignments if a.channel in self.array.channels):
             found[self.array.index(a.channel)] = a.deviation(found[self.array.index(a.channel)])
         return found
 

@@ -137,8 +137,9 @@ class Recording:
 
     @property
     def rate(self) -> float:
-        """Samples per second of the common time base: that of the fastest clock."""
-        return max(clock.rate for clock in self.clocks)
+        """Samples per second of the common time base: that of the clock whose stamps it has."""
+        base = [c.rate for t, c in zip(self.native, self.clocks, strict=True) if t.channel not in self.resampled]
+        return max(base) if base else float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
 
     def column(self, channel: str) -> FloatArray:
         """(n,) readings of one channel, SI."""

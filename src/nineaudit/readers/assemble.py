@@ -44,9 +44,11 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     usable = [in_order(trace.time) for trace in traces]
     clocks = tuple(clock_of(trace.time, used) for trace, used in zip(traces, usable, strict=True))
     native = tuple(_only(trace, used) for trace, used in zip(traces, usable, strict=True))
-    base = max(range(len(native)), key=lambda i: native[i].time.size)
-    _require_samples(native[base].time, source)
-    time, cut = _common(native, base, source) if u_parts else (native[base].time, ())
+    shared = _shared(native, source) if u_parts else (-np.inf, np.inf)
+    base = max(range(len(native)), key=lambda i: _inside(native[i].time, shared).size)
+    time = _inside(native[base].time, shared)
+    _require_samples(time, source)
+    cut = _cut(native[base], time)
     columns, alignments = _on_one_base(time, native, clocks, base, source, u_parts or {})
     readings = frozen(np.column_stack(columns))
     said = alignment.notes(alignments, native[base].channel, clocks[base].rate, _si_units(rig))
@@ -65,18 +67,27 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     )
 
 
-def _common(native: Sequence[Trace], base: int, source: Source) -> tuple[FloatArray, tuple[str, ...]]:
-    """The stamps of `native[base]` while every part was recording, and a note on those that are left out."""
-    time = native[base].time
+def _shared(native: Sequence[Trace], source: Source) -> tuple[float, float]:
+    """From when every part was recording until the first one ended, s."""
+    longest = max(native, key=lambda trace: trace.time.size)
     for trace in native:
-        _require_overlap(time, trace, source)
-    start, end = max(float(t.time[0]) for t in native), min(float(t.time[-1]) for t in native)
-    first, last = int(np.searchsorted(time, start)), int(np.searchsorted(time, end, side="right"))
-    _require_samples(time[first:last], source)
-    if last - first == time.size:
-        return time, ()
-    text = f"{first} samples at the start and {time.size - last} at the end are left out: not every part was recording"
-    return frozen(time[first:last]), (f"{native[base].channel}: {text}",)
+        _require_overlap(longest.time, trace, source)
+    return max(float(t.time[0]) for t in native), min(float(t.time[-1]) for t in native)
+
+
+def _inside(time: FloatArray, span: tuple[float, float]) -> FloatArray:
+    kept = (time >= span[0]) & (time <= span[1])
+    return time if kept.all() else frozen(time[kept])
+
+
+def _cut(base: Trace, time: FloatArray) -> tuple[str, ...]:
+    """A note on the stamps of the base that are not in the common time."""
+    if time.size == base.time.size:
+        return ()
+    first = int(np.searchsorted(base.time, time[0]))
+    last = base.time.size - first - time.size
+    where = f"{first} samples at the start and {last} at the end are left out: not every part was recording"
+    return (f"{base.channel}: {where}",)
 
 
 def _on_one_base(
