@@ -149,7 +149,7 @@ def _read_alike(
 
 def _first(chars: ByteMatrix, todo: Rows, parse: Parse, buses: dict[str, int]) -> tuple[int, Layout | None]:
     """How many of the lines `todo` are no frames before the first that is one, and its layout."""
-    for passed, place in enumerate(todo.tolist()):
+    for passed, place in enumerate(todo):
         layout = parse(chars[:, place].tobytes())
         if layout is not None and (layout.bus in buses or len(buses) < MOST_BUSES):
             return passed, layout
