@@ -309,6 +309,23 @@ def test_a_bomb_is_read_to_its_bound(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert f"Channel/T1.001: more than {bound} bytes in a file; the rest is not read" in map(str, found.damage)
 
 
+def test_samples_are_read_in_slices_to_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nineaudit.readers.mme_channel._SLICE", 30)
+    p: list[object] = list(P)
+    p[7] = "gap"
+    content = files(p=channel(CODES[0], p))
+    found = contents(tmp_path, content)
+    same(found, np.where(P == 7.5, np.nan, P))
+    assert [str(d) for d in found.damage] == ["T1.001 line 21: a sample that is no number; they are missing"]
+    monkeypatch.setattr("nineaudit.readers.mme_channel.MOST", 10)
+    found = contents(tmp_path, content)
+    np.testing.assert_array_equal(found.traces[1].values, Q[:10])
+    assert "T1.002: more than 10 samples in a channel; the rest is not read" in map(str, found.damage)
+    monkeypatch.setattr(mme_files, "MOST_CHANNELS", 1)
+    with pytest.raises(RecordingError, match="too many channels; found 2; expected up to 1"):
+        contents(tmp_path, content)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_flipped_and_cut_tests_end_in_a_recording_or_one_of_our_errors(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)

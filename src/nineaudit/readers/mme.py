@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from nineaudit.rig import Rig
 
 _NAMES: Final = ("channel code", "laboratory channel code", "customer channel code", "name of the channel")
+_INDEX: Final = 2**20
+"""Bytes of an index that are read: more than its thousands of channels need."""
 _SOUND: Final = ("", "ok")
 _TREATED: Final = ("scaling factor applied", "linearised data", "linearized data")
 _UNITS: Final = {"g": "g_0", "m/(s*s)": "m/s^2", "mm/(s*s)": "mm/s^2", "ft/(s*s)": "ft/s^2", "1": None, "": None}
@@ -77,7 +79,7 @@ def _indexed(test: Test, heads: list[Channel]) -> tuple[list[Channel], list[Dama
     """Channels with the code that the index gives where their file has none; and where the two disagree."""
     if test.index is None:
         return heads, [Damage("no index of channels (.chn)", test.header or "the test", lost="the files are read")]
-    data, damage = test.store.read(test.index, LARGEST)
+    data, damage = test.store.read(test.index, _INDEX)
     keys = parse_keys(data)
     listed = {int(k[16:]): v for k, v in keys.items() if k.startswith("name of channel ") and k[16:].isdecimal()}
     numbers = {int(head.short.rpartition(".")[2]): head for head in heads}

@@ -21,8 +21,9 @@ from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import cut_short
 from nineaudit.recording import Damage
 
-LARGEST: Final = 256 * 2**20
-"""Bytes of a channel that are read: some 16 million samples."""
+LARGEST: Final = 128 * 2**20
+"""Bytes of a channel that are read."""
+MOST_CHANNELS: Final = 5000
 _STEP: Final = 2**20
 _CHANNEL: Final = re.compile(r"\.\d{3,}$")
 _BROKEN: Final = (zipfile.BadZipFile, NotImplementedError, ValueError, OverflowError, struct.error, EOFError)
@@ -202,6 +203,8 @@ def _test_in(store: Store, path: Path, chosen: str | None) -> Test:
     near = [name for name in store.names if header is None or _belongs(name, header)]
     channels = _of_stem([name for name in near if _CHANNEL.search(name)], header)
     index = next(iter(_of_stem([name for name in near if name.lower().endswith(".chn")], header)), None)
+    if len(channels) > MOST_CHANNELS:
+        raise RecordingError("too many channels", file=path, found=len(channels), expected=f"up to {MOST_CHANNELS}")
     if not channels:
         raise RecordingError(
             "no channel files of an ISO-MME test",
