@@ -94,17 +94,23 @@ def messages(data: Data, indexes: Sequence[Index]) -> Messages:
     they do not, all are, and `indexed` says so."""
     indexes = [i for i in indexes if len(i.offsets)]
     if indexes:
-        offsets = np.concatenate([i.offsets for i in indexes])
-        order = np.argsort(offsets, kind="stable")
-        others = _between(data, offsets[order])
+        told, times, offsets = _in_file_order(indexes)
+        others = _between(data, offsets)
         if others is not None:
-            found = messages_at(data, offsets[order], others)
-            told = np.concatenate([np.full(len(i.offsets), i.channel) for i in indexes])[order]
-            times = np.concatenate([i.times for i in indexes])[order]
+            found = messages_at(data, offsets, others)
             if np.array_equal(told, found.channel) and np.array_equal(times, found.times):
                 return found
-    found = _walked(data)
-    return found._replace(indexed=not indexes)
+    return _walked(data)._replace(indexed=not indexes)
+
+
+def _in_file_order(indexes: Sequence[Index]) -> tuple[NDArray[np.uint16], Int64, Int64]:
+    """(n,) channels, log times and offsets of the message indexes of a chunk, by offset."""
+    told = np.repeat(np.array([i.channel for i in indexes], dtype=np.uint16), [len(i.offsets) for i in indexes])
+    times, offsets = (np.concatenate(column) for column in zip(*((i.times, i.offsets) for i in indexes), strict=True))
+    if (offsets[1:] > offsets[:-1]).all():
+        return told, times, offsets
+    order = np.argsort(offsets, kind="stable")
+    return told[order], times[order], offsets[order]
 
 
 def _between(data: Data, offsets: Int64) -> tuple[Record, ...] | None:

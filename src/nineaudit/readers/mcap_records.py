@@ -9,7 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -174,8 +174,9 @@ def _by_channel(data: Data, found: Messages, at: int, book: Book, wanted: Wanted
     """The messages of each wanted channel; all are counted."""
     order = book.seen + np.arange(len(found.channel))
     book.seen += len(found.channel)
-    for number in np.unique(found.channel).tolist():
-        rows = np.flatnonzero((found.channel == number) & (found.times >= 0))
+    timed = found.times >= 0
+    for number in _different(found.channel):
+        rows = np.flatnonzero((found.channel == number) & timed)
         late = int(np.count_nonzero(found.channel == number)) - len(rows)
         if late:
             book.damages.add("a log time after the year 2262", at, count=late, lost=late)
@@ -186,6 +187,13 @@ def _by_channel(data: Data, found: Messages, at: int, book: Book, wanted: Wanted
         if channel is not None and len(rows) and wanted(channel):
             starts, ends, times, place = (c[rows] for c in (found.starts, found.ends, found.times, order))
             yield Batch(channel, data, starts, ends, times, place, at)
+
+
+def _different(numbers: Any) -> list[int]:
+    """The different ones of (n,) numbers."""
+    if len(numbers) and (numbers == numbers[0]).all():
+        return [int(numbers[0])]
+    return [int(n) for n in np.unique(numbers)]
 
 
 def _compare(last: Summary, book: Book) -> None:
