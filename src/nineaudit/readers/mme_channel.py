@@ -114,7 +114,8 @@ def samples(channel: Channel, data: bytes) -> tuple[FloatArray, int, list[Damage
         damage.append(_damage(channel, "a sample that is no number", odd[0], len(odd), "they are missing"))
     if start < len(body) or count > MOST:
         damage.append(Damage(f"more than {MOST} samples in a channel", channel.short, lost="the rest is not read"))
-    damage += _miscounted(channel, values.size)
+    else:
+        damage += _miscounted(channel, values.size)
     return values, int(np.count_nonzero(np.isnan(values))), damage
 
 
