@@ -157,6 +157,27 @@ def test_python_cans_own_formats(tmp_path: Path, suffix: str, writer: Any) -> No
     assert found.damage == ()
 
 
+def test_a_database_with_a_journal_or_bad_rows_is_damage(tmp_path: Path) -> None:
+    import sqlite3
+
+    path = tmp_path / "t.db"
+    log = [can.Message(arbitration_id=i, is_extended_id=False, data=[i]) for i in range(3)]
+    written(path, can.SqliteWriter, log)
+    with sqlite3.connect(path) as base:
+        base.execute("INSERT INTO messages VALUES (1.0, 'x', 0, 0, 0, 1, x'11')")
+        base.execute("INSERT INTO messages VALUES (1.0, 5, 0, 0, 0, 3, x'11')")
+        base.execute("INSERT INTO messages VALUES (1e300, 5, 0, 0, 0, 1, x'11')")
+    base.close()
+    (tmp_path / "t.db-wal").write_bytes(b"not merged")
+    found = read_by_python_can(path)
+    assert [row[5] for row in rows_of(found)] == [b"\0", b"\1", b"\2"]
+    assert [(d.place, d.count) for d in found.damage] == [("row 1", 1), ("row 4", 2), ("row 5", 1)]
+    (tmp_path / "t.db-wal").unlink()
+    path.write_bytes(path.read_bytes()[:4096])
+    with pytest.raises(RecordingError, match=r"row 1: no CAN frames.*cannot be read any further"):
+        read_by_python_can(path)
+
+
 def test_a_real_log_against_python_can(shared_data: Path) -> None:
     path = shared_data / "rav4-can" / "drive-10s.log"
     with can.LogReader(path) as reader:

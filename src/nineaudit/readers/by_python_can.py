@@ -36,7 +36,7 @@ def read_by_python_can(path: Path) -> Frames:
     where there is not one frame.
     """
     suffix = path.suffix.lower()
-    account = Account()
+    account = Account("row" if suffix == ".db" else "line")
     rows = Rows()
     if suffix == ".db":
         notes = read_database(path, rows, account)
@@ -138,7 +138,7 @@ def _nothing(path: Path, account: Account) -> RecordingError:
     return RecordingError(
         "no CAN frames in this log",
         file=path,
-        place=f"{'row' if path.suffix.lower() == '.db' else 'line'} {first[1].line}" if first else None,
+        place=f"{account.unit} {first[1].line}" if first else None,
         found=(first[1].text.strip("'\"") or first[0]) if first else "nothing but its header",
         expected={".trc": "a PEAK TRC log", ".csv": "a CSV log of python-can"}.get(
             path.suffix.lower(), "a .db of can.SqliteWriter"

@@ -18,6 +18,11 @@ def read_database(path: Path, rows: Rows, account: Account) -> tuple[str, ...]:
         base = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
     except sqlite3.Error as error:
         raise RecordingError(f"not a database that can be read: {error}", file=path) from error
+    for beside in (path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-journal")):
+        if beside.exists() and beside.stat().st_size:
+            account.damaged(
+                "a journal stands beside the database: its writer was broken off", 1, beside.name.encode(), ""
+            )
     number = 0
     try:
         for row in base.execute("SELECT ts, arbitration_id, extended, remote, error, dlc, data FROM messages"):

@@ -88,6 +88,19 @@ class Columns:
         if size > SHORT:
             self._long.append((rows, whole))
 
+    def put_alone(self, row: int, line: bytes, bus: int, layout: Layout, octets: bytes) -> None:
+        """A line whose bytes are known already. One with too many seconds is no frame."""
+        (start, end), seconds = layout.fraction, int(line[slice(*layout.seconds)])
+        if seconds >= MOST_SECONDS:
+            return
+        self.kept[row] = True
+        self.time[row] = seconds * 10**_NANO + int(line[start : min(end, start + _NANO)].ljust(_NANO, b"0"))
+        self._key[row], self._bus[row], self._kind[row], self._length[row] = layout.key, bus, layout.kind, layout.length
+        self._data[row] = int.from_bytes(octets[:SHORT], "little")
+        if len(octets) > SHORT:
+            long = np.frombuffer(octets.ljust(LONG, b"\0"), dtype=np.uint8)
+            self._long.append((np.array([row]), long[None, :]))
+
     def frames(self) -> Frames:
         """The frames in the order of the lines."""
         kept = self.kept
@@ -134,7 +147,7 @@ def _read_alike(
     chars = np.ascontiguousarray(view[begin].view(np.uint8).reshape(-1, size).T)
     todo = np.arange(len(rows))
     while True:
-        passed, layout = _first(chars, todo, parse, buses)
+        passed, layout = _first(chars, rows, todo, parse, buses, columns)
         if layout is None:
             return
         todo = todo[passed:]
@@ -147,19 +160,24 @@ def _read_alike(
             chars, rows, todo = np.take(chars, todo, axis=1), rows[todo], np.arange(len(todo))
 
 
-def _first(chars: ByteMatrix, todo: Rows, parse: Parse, buses: dict[str, int]) -> tuple[int, Layout | None]:
-    """How many of the lines `todo` are no frames before the first that is one, and its layout."""
+def _first(
+    chars: ByteMatrix, rows: Rows, todo: Rows, parse: Parse, buses: dict[str, int], columns: Columns
+) -> tuple[int, Layout | None]:
+    """How many of the lines `todo` to pass over before the first that has others like it, and its layout. Those passed
+    over are no frames, or are read here."""
     for passed, place in enumerate(todo):
-        layout = parse(chars[:, place].tobytes())
-        if layout is not None and (layout.bus in buses or len(buses) < MOST_BUSES):
+        line = chars[:, place].tobytes()
+        layout = parse(line)
+        if layout is None or (layout.bus not in buses and len(buses) >= MOST_BUSES):
+            continue
+        if layout.octets is None:
             return passed, layout
+        columns.put_alone(int(rows[place]), line, buses.setdefault(layout.bus, len(buses)), layout, layout.octets)
     return len(todo), None
 
 
 def _same(chars: ByteMatrix, place: int, layout: Layout) -> BoolArray:
     """(n,) which lines, columns of (size, n) characters, differ from one only where its layout lets them."""
-    if layout.octets is not None:
-        return np.asarray(np.arange(chars.shape[1]) == place)
     fixed = np.ones(len(chars), dtype=np.bool_)
     for start, end in (layout.seconds, layout.fraction, layout.identifier or (0, 0), layout.rest, *layout.words):
         fixed[start:end] = False
@@ -194,8 +212,6 @@ def _numbers(pick: Callable[[Any], ByteMatrix], layout: Layout, fine: BoolArray)
     fine &= seconds < MOST_SECONDS
     time = seconds * 10**_NANO + parts * 10 ** max(_NANO - (end - start), 0)
     key = np.full(len(time), layout.key, dtype=np.int64)
-    if layout.octets is not None:
-        return time, key, np.frombuffer(layout.octets, dtype=np.uint8)[:, None]
     if layout.identifier is not None:
         number = _number(_hexadecimal(pick(slice(*layout.identifier)), fine), 16.0)
         fine &= number <= (_MOST_EXTENDED if layout.key else _MOST_STANDARD)

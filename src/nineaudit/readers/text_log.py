@@ -28,8 +28,9 @@ class _Lost:
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """What a log holds besides frames: `counts` by kind, and by kind the lines that could not be read."""
+    """What a log holds besides frames: `counts` by kind, and by kind the lines (or rows) that could not be read."""
 
+    unit: str = "line"
     counts: Counter[str] = field(default_factory=Counter)
     lines: dict[str, _Lost] = field(default_factory=dict)
 
@@ -40,7 +41,7 @@ class Account:
     @property
     def damage(self) -> tuple[Damage, ...]:
         return tuple(
-            Damage(f"{what}: {x.text}" if x.text else what, f"line {x.line}", x.count, x.lost)
+            Damage(f"{what}: {x.text}" if x.text else what, f"{self.unit} {x.line}", x.count, x.lost)
             for what, x in self.lines.items()
         )
 
