@@ -607,3 +607,30 @@ def test_a_large_object_over_many_containers_is_searched_once(tmp_path: Path, mo
         assert found.key.tolist() == [1, *range(60)]
         assert len(searched) <= 6
         assert bool(found.damage) == (one is lying)
+
+
+@pytest.mark.parametrize("kind", [1, 65])
+def test_a_wrong_size_that_ends_where_a_container_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: int
+) -> None:
+    """An object counts only once the next begins at its end, however the stream is cut; a frame is never that large."""
+    from nineaudit.readers import blf_containers
+
+    monkeypatch.setattr(blf_containers, "WINDOW", 1)
+    for count in range(1, 11):
+        lying = made.obj(kind, made.classic(0), size=250 * count)
+        stream = b"".join([lying, *FRAMES[1:]])
+        parts = [made.container(stream[i : i + 250], method=2 * (count % 2)) for i in range(0, len(stream), 250)]
+        ids, said = damaged(tmp_path, whole(*parts))
+        assert [i for i in ids if i] == list(range(1, 60))
+        assert said
+    stream = b"".join([*FRAMES[:5], made.obj(1, made.classic(5), size=48 * 20), *FRAMES[6:]])
+    ids, said = damaged(tmp_path, whole(made.container(stream)))
+    assert ids == without(range(5, 6))
+    assert said == ["byte 144, inflated byte 240: no object where one must begin; 48 bytes lost"]
+
+
+def test_types_that_are_frames_are_the_same_everywhere() -> None:
+    from nineaudit.readers import blf_chain, blf_objects
+
+    assert set(blf_chain.FRAMES) == set(blf_objects.TYPES)

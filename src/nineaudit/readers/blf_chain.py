@@ -36,6 +36,10 @@ BASE: Final = 16
 PADDING: Final = 3
 LARGEST: Final = 1 << 25
 """Bytes of the largest object, and of the largest content of a container, that is believed; most have 128 KiB."""
+FRAMES: Final = (1, 86, 100, 101, 73, 2, 104, 3)
+"""Types of objects that are CAN frames (blf_objects.TYPES)."""
+LARGEST_FRAME: Final = 256
+"""Bytes of the largest of them that is believed; the largest that is known has 40 + 52 + 64 + 12."""
 ROOM: Final = 128
 """Zero bytes behind a buffer, so that a record may be taken from any place in it."""
 _SIGNATURE: Final = np.uint32(int.from_bytes(b"LOBJ", "little"))
@@ -111,7 +115,10 @@ def _plausible(heads: Records) -> NDArray[np.bool_]:
     header, version = (heads[name][:1] if uniform else heads[name] for name in ("header", "version"))
     fits = (header >= BASE) & (header <= _LONGEST_HEADER) & (version - np.uint16(1) < 3)
     room = size - header  # unsigned: where the object is less than its header this is very much
-    return np.asarray(fits & (room <= LARGEST))
+    plausible = np.asarray(fits & (room <= LARGEST))
+    large = np.flatnonzero(size > LARGEST_FRAME)
+    plausible[large[np.isin(heads["type"][large], FRAMES)]] = False
+    return plausible
 
 
 def _signatures(buffer: Bytes, n: int, phase: int) -> Places:
@@ -127,12 +134,10 @@ def _unbroken(found: _Candidates, last: bool) -> Chain | None:
     gap = at[1:] - end[:-1]
     if len(gap) and not 0 <= gap.min() <= gap.max() <= PADDING:
         return None
-    if end[-1] > n:
-        return None if last else Chain(at[:-1], found.heads[:-1], int(at[-1]))
     rest = n - int(end[-1])
-    if rest > PADDING + (0 if last else 3):
+    if rest > PADDING + (0 if last else 3) or (last and rest < 0):
         return None
-    return Chain(at, found.heads, n if last else int(end[-1]))
+    return Chain(at, found.heads, n) if last else Chain(at[:-1], found.heads[:-1], int(at[-1]))
 
 
 class _Walk:
@@ -144,11 +149,11 @@ class _Walk:
         follower = np.searchsorted(at, end)
         near = at[np.minimum(follower, m - 1)] - end if m else end
         followed = found.plausible & (follower < m) & (near <= PADDING)
-        whole = found.plausible & (end <= n)
-        ended = whole & ~followed & (n - end <= PADDING + 3)
+        whole = found.plausible & (end <= (n if last else n - PADDING - 4))  # else what follows is not there yet
+        ended = whole & ~followed & last & (n - end <= PADDING)
         sure = whole & (followed | ended)
         if not last:
-            sure |= found.plausible & (end > n)
+            sure |= found.plausible & ~whole
         of_type = np.full(m, True) if only is None else found.heads["type"] == only
         self.bends = np.flatnonzero(~(followed & (follower == np.arange(1, m + 1)))).tolist()
         self.follower: list[int] = np.where(followed, follower, -1).tolist()
@@ -174,7 +179,7 @@ class _Walk:
                 at = self.follower[bend]
             elif self.ended[bend]:
                 self.runs.append((bend, bend + 1))
-                tail, synced = self._close(self.end[bend]), True
+                tail, synced = self.found.n, True
                 break
             elif not self.last and self.plausible[bend] and not self.whole[bend]:
                 tail, synced = self.at[bend], True
@@ -212,12 +217,6 @@ class _Walk:
     def _rest(self, begin: int) -> int:
         """End of a gap that nothing ends: the last three bytes may be the begin of a signature."""
         return self.found.n if self.last else max(begin, self.found.n - 3)
-
-    def _close(self, end: int) -> int:
-        n = self.found.n
-        if self.last and n - end > PADDING:
-            self.gaps.append((end, n))
-        return n if self.last else end
 
     def _kept(self, tail: int, synced: bool, cut: bool) -> Chain:
         edges = np.zeros(len(self.at) + 1, dtype=np.int64)

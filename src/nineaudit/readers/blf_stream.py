@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from nineaudit.readers.blf_chain import BASE, LARGEST, ROOM, Bytes, Places, Records, follow
+from nineaudit.readers.blf_chain import BASE, LARGEST, PADDING, ROOM, Bytes, Places, Records, follow
 from nineaudit.readers.blf_inflate import NOTHING_BEGINS, Piece
 from nineaudit.readers.losses import Losses
 
@@ -68,6 +68,8 @@ class Stream:
                     yield self._objects([], last=True)
                     self.rest = _Rest(synced=False, lost=True)
                 elif bare:
+                    if self._is_one_object():
+                        yield self._objects([], last=True)
                     yield from self._bare(part)
                 elif not self._waits(part):
                     yield self._objects(part)
@@ -79,6 +81,12 @@ class Stream:
             if what:
                 lost = 0 if piece.content else piece.stored
                 self.losses.add(what, f"byte {piece.at}", count=not piece.again, lost=lost)
+
+    def _is_one_object(self) -> bool:
+        """Whether all that waits is an object, which only waits for the next to begin at its end."""
+        content = self.rest.content
+        whole = self.rest.synced and len(content) >= BASE
+        return whole and 0 <= len(content) - _SIZE.unpack_from(content)[0] <= PADDING
 
     def _waits(self, pieces: list[Piece]) -> bool:
         """Whether the object that waits for more still does: a stream is not searched again for every part of it."""
@@ -127,7 +135,7 @@ class Stream:
     def _after(self, batch: Batch, content: bytes, tail: int, synced: bool) -> _Rest:
         first = max(bisect_right(batch.begins, tail) - 1, 0)
         begins = tuple(begin - tail for begin in batch.begins[first:])
-        needed = min(_SIZE.unpack_from(content)[0], LARGEST) if synced and len(content) >= BASE else 0
+        needed = min(_SIZE.unpack_from(content)[0], LARGEST) + BASE if synced and len(content) >= BASE else 0
         return _Rest(content, begins, batch.files[first:], synced, needed=needed)
 
     def _book_gaps(self, batch: Batch, gaps: tuple[tuple[int, int], ...], before: _Rest) -> None:
