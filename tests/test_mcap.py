@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import lz4.frame
+import numpy as np
 import pytest
 import zstandard
 from mcap.opcode import Opcode
@@ -90,6 +91,23 @@ def test_one_topic_on_two_channels(tmp_path: Path) -> None:
     found = pq(path)
     assert found.traces[0].values.tolist() == list(range(20))
     assert found.notes == ("topic /imu comes on 2 channels",)
+
+
+def test_channels_of_one_topic_with_other_fields(tmp_path: Path) -> None:
+    path = tmp_path / "t.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channels = [writer.register_channel("/imu", "json", 0) for _ in range(2)]
+        for i in range(6):
+            data = b'{"p": %d, "q": 1}' % i if i % 2 else b'{"q": 2}'
+            writer.add_message(channels[i % 2], log_time=i, publish_time=0, data=data)
+        writer.finish()
+    for signals in (("/imu:p", "q"), ("p", "/imu:q")):
+        found = read_mcap(path, rig_of(*signals, recording='[recording]\ntime="p"\ntime_unit="ns"\n'))
+        assert [t.time.tolist() for t in found.traces] == [[t * 1e-9 for t in range(6)]] * 2
+        np.testing.assert_array_equal(found.traces[0].values, [np.nan, 1, np.nan, 3, np.nan, 5])
+        assert found.traces[1].values.tolist() == [2, 1] * 3
 
 
 def test_topics_that_are_not_asked_for_are_not_decoded(tmp_path: Path) -> None:

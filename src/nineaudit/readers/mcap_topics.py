@@ -58,8 +58,16 @@ class Stream:
     times: list[Int64] = field(default_factory=list)
     order: list[Int64] = field(default_factory=list)
 
+    @property
+    def names(self) -> list[str]:
+        """Every path that is read, each once."""
+        return list(dict.fromkeys([*self.paths, *self.stamp]))
+
     def column(self, path: str) -> Column:
-        """The numbers at a path, of all messages."""
+        """The numbers at a path, of all messages; none where another channel of the topic alone has it."""
+        if path not in self.columns:
+            count = sum(map(len, self.times))
+            return Column(np.zeros(count), np.zeros(count, dtype=bool))
         values, there = zip(*self.columns[path], strict=True)
         return Column(np.concatenate(values), np.concatenate(there))
 
@@ -110,8 +118,8 @@ class Topics:
         stream = self.streams[key]
         if stream is None or not stream.paths:
             return
-        found = stream.decoder.read(batch, [*stream.paths, *stream.stamp])
-        for path, column in zip([*stream.paths, *stream.stamp], found.columns, strict=True):
+        found = stream.decoder.read(batch, stream.names)
+        for path, column in zip(stream.names, found.columns, strict=True):
             stream.columns.setdefault(path, []).append(column)
         stream.times.append(batch.times)
         stream.order.append(batch.order)
