@@ -26,8 +26,8 @@ LONGEST: Final = 1024
 MOST_SECONDS: Final = 9_000_000_000
 """2^63 ns are a little more."""
 MOST_BUSES: Final = 256
-_ROWS: Final = 4096
-"""Lines of a matrix: it stays in the processor's cache."""
+_ROWS: Final = 1 << 14
+"""Lines of a matrix, which stays in the processor's cache."""
 _FEW: Final = 4
 """Once less than one in so many lines is left, the others are dropped."""
 _MOST_STANDARD: Final = 0x7FF
@@ -109,7 +109,7 @@ class Columns:
         order = np.argsort(long_rows, kind="stable")
         place = (np.cumsum(kept) - 1)[long_rows[order]]
         columns = (self.time, self._key, self._bus, self._kind, self._length, self._data)
-        time, key, bus, kind, length, data = (column[kept] for column in columns)
+        time, key, bus, kind, length, data = columns if kept.all() else (column[kept] for column in columns)
         return frames(time, key, bus, kind, length, data.view(np.uint8).reshape(-1, SHORT), place, long[order])
 
 
