@@ -1,40 +1,35 @@
 """A recording's motion, whole: ω, α, attitude; acceleration, velocity, position of points; injury values; their u.
 
-The method gives ω, α and a0 (METHODS); the rest is the same for all of them (physics/laboratory.py). Uncertainties come
-with the whole-record fit only: root mean square of what motions drawn from its posterior give (JCGM 101, as in
-impact.py), on the blocks of the fit, and for a and α of a single sample the white noise that a block's mean has not.
+The method gives ω, α and a0 (METHODS); the rest is the same for all of them (physics/laboratory.py). Uncertainties are
+those of motion_spread.py: of the whole-record fit from its posterior, of any other method from the instrument.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
-
-import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.case import Case
-from nineaudit.estimate.draws import draws
-from nineaudit.estimate.motion import Motion, bridge
-from nineaudit.estimate.samples import Samples, at_samples
-from nineaudit.estimate.trajectory import Fit
-from nineaudit.impact import reported, unit_of
-from nineaudit.motion_methods import AT_REST, Start, by_fit, method_named
-from nineaudit.physics import kinematics, laboratory, rigid_body
+from nineaudit.errors import EstimationError
+from nineaudit.estimate import parity
+from nineaudit.estimate.motion import Motion, has_rates
+from nineaudit.estimate.samples import Samples
+from nineaudit.gaps import Gaps, gaps, long, refused
+from nineaudit.impact import unit_of
+from nineaudit.motion_methods import ACCELEROMETERS_ONLY, AT_REST, Method, Start, by_fit, method_named
+from nineaudit.motion_spread import Spread, by_instruments, by_posterior, chained, points_of, whole
+from nineaudit.physics import laboratory
 from nineaudit.physics.laboratory import Path
-from nineaudit.rig import Point
+from nineaudit.schemes import ninacc
 from nineaudit.schemes.requirements import require_readings
-from nineaudit.units import G0
+from nineaudit.wrong_unit import wrong_unit
 
 __all__ = ["Kinematics", "Start", "Value", "motion_of"]
 
-DRAWS, SEED = 64, 19770046
-"""Monte Carlo draws (JCGM 101) for the uncertainties, 9 % of each of them, and their seed."""
-DOWN: Final = np.array([0.0, 0.0, G0])
-"""Gravity in the laboratory, m/s²: +z is down (SAE J1733)."""
-ORIGIN: Final = Point("origin", np.zeros(3))
+DRAWS = 64
+"""Monte Carlo draws (JCGM 101) for the uncertainties, 9 % of each of them."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +48,8 @@ class Kinematics:
     `method` in words.
 
     `u`: standard uncertainties (n,3) of "omega", "alpha", "attitude" (rad, about the body axes), and of every point
-    "NAME a" (body axes), "NAME v" and "NAME x" (laboratory); empty where the method gives none. `notes` in words.
+    "NAME a" (body axes), "NAME v" and "NAME x" (laboratory); empty where none can be told. `notes` in words; those of
+    them that make the numbers doubtful are `warnings`. `wrong_unit`: whether the first of these names a wrong unit.
     """
 
     time: FloatArray
@@ -67,6 +63,8 @@ class Kinematics:
     method: str
     u: Mapping[str, FloatArray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    wrong_unit: bool = False
 
     @cached_property
     def euler(self) -> FloatArray:
@@ -87,12 +85,11 @@ def motion_of(case: Case, method: str = "map", start: Start = AT_REST, count: in
     """
     solve = method_named(method)
     require_readings(case.array, case.recording.readings)
-    at = by_fit(case, start) if method == "map" else None
-    motion = _whole(at.motion, case.time) if at is not None else solve(case, start)
-    rest = None if case.rest is None else case.rest.start
-    found, paths = _chain(case, case.time, motion, start, rest)
-    values = reported(case, case.time, found.motion)
-    u, value_u = ({}, {}) if at is None or count < 1 else _uncertainty(case, at, start, count)
+    at, used, motion, said = _solved(case, method, solve, start)
+    found = chained(used, case.time, motion, start, None if used.rest is None else used.rest.start)
+    (u, value_u), of_u = _spread(used, solve, at, motion, start, count)
+    unit = None if at is None or at.fit.statistic <= case.statistic_limit else wrong_unit(case)
+    warnings = () if at is None else _warnings(case, at, unit)
     return Kinematics(
         time=case.time,
         omega=motion.omega,
@@ -100,113 +97,79 @@ def motion_of(case: Case, method: str = "map", start: Start = AT_REST, count: in
         a0=found.motion.a0,
         attitude=found.attitude,
         points={point.name: point.position for point in points_of(case)},
-        paths=paths,
-        values={name: Value(value, unit_of(name), value_u.get(name)) for name, value in values.items()},
+        paths=found.paths,
+        values={name: Value(value, unit_of(name), value_u.get(name)) for name, value in found.values.items()},
         method=motion.method,
         u=u,
-        notes=_notes(case, start, at),
+        notes=(*warnings, *said, *_notes(used, start), *of_u),
+        warnings=warnings,
+        wrong_unit=unit is not None,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Motion with gravity put right, and attitude."""
-
-    motion: Motion
-    attitude: FloatArray
-
-
-def points_of(case: Case) -> tuple[Point, ...]:
-    """The points that the rig names, or the origin."""
-    return case.recording.rig.points or (ORIGIN,)
-
-
-def _chain(
-    case: Case, time: FloatArray, motion: Motion, start: Start, rest: int | None
-) -> tuple[_Found, dict[str, Path]]:
-    """Attitude, acceleration less gravity, and the path of every point."""
-    attitude = kinematics.orientation(motion.omega, time, laboratory.attitude_of(np.asarray(start.euler)))
-    a0 = laboratory.without_gravity(motion.a0, attitude, DOWN, rest) if start.gravity else motion.a0
-    origin = laboratory.origin_path(time, a0, attitude, np.asarray(start.velocity), np.asarray(start.position))
-    paths = {
-        point.name: laboratory.point_path(point.position, origin, motion.alpha, motion.omega, attitude)
-        for point in points_of(case)
-    }
-    return _Found(Motion(motion.omega, motion.alpha, a0, motion.method), attitude), paths
+def _solved(
+    case: Case, method: str, solve: Method, start: Start
+) -> tuple[Samples | None, Case, Motion, tuple[str, ...]]:
+    """The motion, of the fit its samples, the case with the channels that were used, and what is to be said of gaps."""
+    missing = gaps(case.recording)
+    if method == "map" and (parity.tells_alpha(case.array) or not has_rates(case.array)):
+        at = by_fit(case, start)
+        return at, case, whole(at.motion, case.time), tuple(f"{one}; absent to the fit" for one in missing)
+    if method in ACCELEROMETERS_ONLY:
+        missing = tuple(one for one in missing if case.array[one.channel].kind == "accelerometer")
+    torn = long(missing)
+    if not torn:
+        return None, case, solve(case, start), _bridged(missing)
+    left = {one.channel for one in torn}
+    used = Case(case.recording.only([k for k, c in enumerate(case.array.channels) if c not in left]))
+    try:
+        motion = solve(used, start)
+    except EstimationError as error:
+        raise refused(torn, str(error)) from error
+    others = tuple(one for one in missing if one.channel not in left)
+    return None, used, motion, (*(f"{one}; the channel is left out" for one in torn), *_bridged(others))
 
 
-def _uncertainty(case: Case, at: Samples, start: Start, count: int) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    """Standard uncertainties of the curves, at every sample, and of the reported values."""
-    blocks = case.condensed
-    rest = None if case.rest is None else min(case.rest.start // blocks.length, len(blocks.time) - 1)
-
-    def chain(fit: Fit, readings: FloatArray) -> tuple[_Found, dict[str, Path]]:
-        there = at_samples(fit, blocks.time, readings, blocks.sigma, at.fit).motion
-        return _chain(case, blocks.time, _whole(there, blocks.time), start, rest)
-
-    def said(found: _Found) -> dict[str, float]:
-        return reported(case, blocks.time, found.motion)
-
-    rng, readings = np.random.default_rng(SEED), blocks.readings
-    itself, its_paths = chain(at.fit, readings)
-    its_values = said(itself)
-    squares = {name: np.zeros((len(blocks.time), 3)) for name, _ in _differences(itself, its_paths, itself, its_paths)}
-    of_values = dict.fromkeys(its_values, 0.0)
-    for drawn in draws(at.fit, count, rng):
-        found, paths = chain(drawn, readings + blocks.sigma * rng.standard_normal(readings.shape))
-        for name, difference in _differences(itself, its_paths, found, paths):
-            squares[name] += difference**2 / count
-        for name, value in said(found).items():
-            of_values[name] += (value - its_values[name]) ** 2 / count
-    white = _white(case, at)
-    carried = {name: _carried(square, blocks.time, case.time) for name, square in squares.items()}
-    u = {name: np.sqrt(square + white.get(name, 0.0)) for name, square in carried.items()}
-    return u, {name: square**0.5 for name, square in of_values.items()}
+def _bridged(missing: tuple[Gaps, ...]) -> tuple[str, ...]:
+    return tuple(f"{one}; bridged by a straight line" for one in missing if one.count < one.total)
 
 
-def _differences(
-    one: _Found, paths: Mapping[str, Path], other: _Found, others: Mapping[str, Path]
-) -> Iterator[tuple[str, FloatArray]]:
-    """Each curve of `Kinematics.u`, other less one (n,3); of the attitude, the rotation vector in body axes."""
-    from scipy.spatial.transform import Rotation
-
-    turn = np.einsum("nji,njk->nik", one.attitude, other.attitude)
-    yield "omega", other.motion.omega - one.motion.omega
-    yield "alpha", other.motion.alpha - one.motion.alpha
-    yield "attitude", np.asarray(Rotation.from_matrix(turn).as_rotvec())
-    for name, path in paths.items():
-        yield f"{name} a", others[name].a_body - path.a_body
-        yield f"{name} v", others[name].v - path.v
-        yield f"{name} x", others[name].x - path.x
-
-
-def _white(case: Case, at: Samples) -> dict[str, FloatArray]:
-    """(n,3) variance of α and of a at each point that a single sample's noise has beyond that of a block's mean."""
-    extra = np.maximum(case.sigma**2 - case.condensed.sigma**2, 0.0)
-    out = {"alpha": ((at.solver[:, 3:] ** 2) @ extra)[at.which]}
-    for point in points_of(case):
-        rows = rigid_body.design(np.tile(point.position, (3, 1)), np.eye(3))
-        out[f"{point.name} a"] = (((rows @ at.solver) ** 2) @ extra)[at.which]
-    return out
+def _spread(
+    case: Case, solve: Method, at: Samples | None, found: Motion, start: Start, count: int
+) -> tuple[Spread, tuple[str, ...]]:
+    """The uncertainties, and what is to be said of them."""
+    if count < 1:
+        return ({}, {}), ()
+    if at is not None:
+        return by_posterior(case, at, start, count), ()
+    try:
+        spread = by_instruments(case, solve, found, start, count)
+    except EstimationError as error:
+        fails = "on readings changed within the rig's uncertainties the method fails"
+        return ({}, {}), (f"no uncertainties: {fails}: {error}",)
+    said = "gain, alignment, position, timing, noise, and zero where none is taken off; not of the method itself"
+    return spread, (f"u: {count} instruments drawn from the rig's uncertainties of {said}",)
 
 
-def _carried(values: FloatArray, at: FloatArray, time: FloatArray) -> FloatArray:
-    return np.stack([np.interp(time, at, values[:, i]) for i in range(values.shape[1])], axis=1)
-
-
-def _whole(motion: Motion, time: FloatArray) -> Motion:
-    """The motion with the samples bridged at which the valid readings do not tell a0 or α."""
-    return Motion(motion.omega, bridge(motion.alpha, time), bridge(motion.a0, time), motion.method)
-
-
-def _notes(case: Case, start: Start, at: Samples | None) -> tuple[str, ...]:
-    """What a reader must know of how the numbers came about."""
-    doubts = []
-    if at is not None and at.fit.statistic > case.statistic_limit:
+def _warnings(case: Case, at: Samples, unit: str | None) -> tuple[str, ...]:
+    """What makes the numbers of the fit doubtful, the `unit` that is probably wrong before all."""
+    said = []
+    if at.fit.statistic > case.statistic_limit:
         cost = f"{at.fit.statistic:.3g} per degree of freedom, at most {case.statistic_limit:.3g} expected"
-        doubts = [f"the channels contradict one another (cost {cost}): `nineaudit check` before these numbers are used"]
-    if at is not None and not at.fit.converged:
-        doubts.append("the whole-record fit has not settled: take these numbers with caution")
+        said = [f"{unit}: all numbers below are wrong until it is put right"] if unit else []
+        said.append(f"the channels contradict one another (cost {cost}): `nineaudit check` before numbers are used")
+    held = case.array.is_accelerometer & case.valid.any(axis=0)
+    poor = ninacc.poor(case.array.positions[held], case.array.axes[held]) if held.any() else ""
+    if not at.fit.converged:
+        why = f": {poor}" if poor else ": take these numbers with caution"
+        said.append(f"the whole-record fit has not settled{why}")
+    elif poor:
+        said.append(poor)
+    return tuple(said)
+
+
+def _notes(case: Case, start: Start) -> tuple[str, ...]:
+    """What a reader must know of how the numbers came about."""
     rest = case.rest
     zero = (
         "no quiet interval: no zero was taken off"
@@ -215,4 +178,4 @@ def _notes(case: Case, start: Start, at: Samples | None) -> tuple[str, ...]:
     )
     left = "as it is in the readings" if rest is None else "as the zero leaves it, up to 2 g when the body turns over"
     pull = "gravity put right by the initial orientation" if start.gravity else f"gravity left {left} (see --gravity)"
-    return (*doubts, zero, pull)
+    return (zero, pull)

@@ -98,13 +98,15 @@ def motion(
     """Motion of the body: ω, α, attitude; acceleration, velocity, position of points; HIC, GSI, a3ms, BrIC with their
     uncertainty.
 
-    Exit code 1: the triax of --check-triax deviates by more than in the paper (HIC 0.29 %, GSI 0.80 %, Alem 1977) and
-    than the stated uncertainties explain.
+    Exit code 1: the unit of all accelerations or rates is not the rig's, as the record itself shows; or the triax of
+    --check-triax deviates by more than in the paper (HIC 0.29 %, GSI 0.80 %, Alem 1977) and than the stated
+    uncertainties explain.
     """
     from nineaudit.case import Case
     from nineaudit.motion import motion_of
     from nineaudit.motion_files import files_of, writer_of
     from nineaudit.motion_methods import method_named
+    from nineaudit.motion_text import gyro_lines, summary, triax_lines, worst_case_lines
     from nineaudit.outputs import protect, require_absent
     from nineaudit.readers import read
     from nineaudit.rig import load_rig
@@ -123,11 +125,11 @@ def motion(
     found = motion_of(case, method, start)
     found = replace(found, notes=(*notes, *found.notes))
     lines = [*summary(found, instrument, recording.name), *_written(found, instrument, recording, output, html, force)]
-    lines += [*_worst_case_lines(case, found, worst_case), *_gyro_lines(case, found, gyro_response)]
+    lines += [*worst_case_lines(case, found, worst_case), *gyro_lines(case, found, gyro_response)]
     if check_triax is None:
-        return lines, 0
-    said, passed = _triax_lines(case, check_triax, method, start)
-    return [*lines, *said], 0 if passed else 1
+        return lines, int(found.wrong_unit)
+    said, passed = triax_lines(case, check_triax, method, start)
+    return [*lines, *said], int(found.wrong_unit or not passed)
 
 
 def _framed(rig: Rig, text: str | None) -> Rig:
@@ -174,81 +176,6 @@ def with_points(rig: Rig, texts: list[str]) -> Rig:
     if len({p.name for p in points}) < len(points):
         raise ConfigurationError("two points of one name", place="--point", found=[p.name for p in points])
     return replace(rig, points=tuple(points)) if points else rig
-
-
-def summary(found: Kinematics, rig: Rig, name: str) -> list[str]:
-    """What was found, in the rig's units: peaks, injury values with their standard uncertainty, and how far it went."""
-    import numpy as np
-
-    from nineaudit.report.numbers import digits, edge, quantity, spelled
-
-    rate = (len(found.time) - 1) / (found.time[-1] - found.time[0])
-    span = f"{found.time[0]:.4g} to {found.time[-1]:.4g} s, {len(found.time)} samples at {digits(float(rate))} Hz"
-    lines = [f"{name}: {span}; {found.method}"]
-    width = max(map(len, found.values))
-    for label, value in found.values.items():
-        unit, one = edge(value.unit, rig)
-        u = "" if value.u is None else f"  u {digits(value.u / one, 2)}"
-        lines.append(f"  {label:<{width}}  {digits(value.value / one, 4)} {spelled(unit)}".rstrip() + u)
-    largest = zip(("yaw", "pitch", "roll"), np.degrees(np.abs(found.euler).max(axis=0)), strict=True)
-    lines.append("  largest angles: " + ", ".join(f"{axis} {angle:.3g}°" for axis, angle in largest))
-    unit, one = edge("m", rig)
-    for point, path in found.paths.items():
-        fastest = float(np.linalg.norm(path.v, axis=1).max())
-        farthest = float(np.linalg.norm(path.x - path.x[0], axis=1).max()) / one
-        reach = f"{quantity(fastest, 'm/s')}, {quantity(farthest, unit)} from its start"
-        lines.append(f"  {point} in the laboratory: at most {reach}")
-    return [*lines, *(f"  note: {note}" for note in found.notes)]
-
-
-def _worst_case_lines(case: Case, found: Kinematics, text: str | None) -> list[str]:
-    if text is None:
-        return []
-    from nineaudit import motion_six
-    from nineaudit.report.numbers import digits
-
-    channels, limit = motion_six.chosen(text, case)
-    worst = motion_six.worst_case(case, found.omega[0], channels, limit)
-    end, most = (", ".join(digits(value, 3) for value in values) for values in (worst.at_end, worst.at_most))
-    return [
-        f"six accelerometers, gains of {', '.join(channels)} off by up to {100 * limit:g} %, worst signs:",
-        f"  ω x, y, z at the end by up to {end} rad/s, {100 * worst.of_peak:.1f} % of its peak; at most {most} rad/s",
-    ]
-
-
-def _gyro_lines(case: Case, found: Kinematics, text: str | None) -> list[str]:
-    if text is None:
-        return []
-    from nineaudit import motion_six
-    from nineaudit.commands import numbers
-    from nineaudit.report.numbers import digits
-
-    response = numbers(text, "--gyro-response") or []
-    if len(response) != 2:
-        raise ConfigurationError(
-            "response of the rate sensors", place="--gyro-response", found=text, expected="HZ,ZETA such as 37,0.5"
-        )
-    done = motion_six.agreement(case, found.omega, *response)
-    largest, rms = (", ".join(digits(value, 3) for value in values) for values in (done.largest, done.rms))
-    return [
-        f"ω through a response of {response[0]:g} Hz, ζ = {response[1]:g}, less the rate sensors, x, y, z:",
-        f"  largest {largest} rad/s, {100 * max(done.of_peak):.2g} % of their peak; rms {rms} rad/s",
-    ]
-
-
-def _triax_lines(case: Case, prefix: str, method: str, start: Start) -> tuple[list[str], bool]:
-    from nineaudit.finding import Verdict
-    from nineaudit.motion_triax import check_triax
-    from nineaudit.report.numbers import digits
-
-    found = check_triax(case, prefix, method, start)
-    lines = [f"triax {', '.join(found.channels)} as the other channels predict it, against measured:"]
-    for one in found.judged:
-        expanded = "U not known" if one.U is None else f"U {digits(100 * one.U, 2)} %, k=2"
-        pair = f"{digits(one.predicted, 4)} against {digits(one.measured, 4)}, {100 * one.deviation:+.2f} %"
-        lines.append(f"  {one.name} {pair} ({expanded}); {100 * one.tolerance:.2f} % in the paper: {one.verdict}")
-    lines.append(f"  largest difference of acceleration {100 * found.worst:.2g} % of the peak")
-    return lines, all(one.verdict is not Verdict.FAIL for one in found.judged)
 
 
 def _written(

@@ -21,7 +21,8 @@ from nineaudit import motion_can
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError
 from nineaudit.motion import Kinematics
-from nineaudit.signals import MCAP_ORIGIN, suggestion
+from nineaudit.presets import nearest
+from nineaudit.signals import MCAP_ORIGIN
 
 Writer = Callable[[Kinematics, Path], tuple[str, ...]]
 """Writes a motion to a file and returns notes on what its format changed."""
@@ -86,12 +87,13 @@ def writer_of(path: Path) -> Writer:
     """The writer for the path's suffix; ConfigurationError names those there are."""
     suffix = path.suffix.lower()
     if suffix not in WRITERS:
+        close = nearest(suffix, list(WRITERS)) if suffix else None
         raise ConfigurationError(
             "no format to write a motion in",
             file=path,
             found=path.suffix or "no suffix",
             expected="one of " + " ".join(WRITERS),
-            advice=suggestion(suffix, WRITERS) if suffix else None,
+            advice=f"did you mean {close!r}?" if close else None,
         )
     return WRITERS[suffix]
 

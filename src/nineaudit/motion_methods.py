@@ -13,10 +13,11 @@ import numpy as np
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.errors import ConfigurationError, EstimationError
-from nineaudit.estimate import trajectory
+from nineaudit.estimate import parity, trajectory
 from nineaudit.estimate.deferred import deferred
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, estimate_motion, has_rates
 from nineaudit.estimate.samples import Samples, at_samples
+from nineaudit.estimate.smoothed_rates import at_rates, smoothed_rates
 from nineaudit.physics import kinematics, nap, rigid_body
 from nineaudit.schemes import growth, martin, ninacc, rgla
 from nineaudit.schemes.requirements import require_acceleration, require_alpha, require_readings
@@ -65,7 +66,12 @@ def _from(case: Case, omega: Vector) -> FloatArray:
 
 
 def _map(case: Case, start: Start) -> Motion:
-    return by_fit(case, start).motion
+    """The fit; where only rate sensors tell α, the whole-record smoother of their ω (estimate/rate_smoother.py)."""
+    if parity.tells_alpha(case.array) or not has_rates(case.array):
+        return by_fit(case, start).motion
+    blocks = case.condensed
+    on_blocks = smoothed_rates(case.array, blocks.time, blocks.readings, blocks.sigma)
+    return at_rates(case.array, case.time, case.readings, on_blocks, blocks.time)
 
 
 def _padgaonkar(case: Case, start: Start) -> Motion:
@@ -198,6 +204,10 @@ METHODS: Final[Mapping[str, tuple[Method, str]]] = {
     "rgla-lanczos": (_rgla("lanczos"), "the same, derivative of a Fourier series with Lanczos factors"),
 }
 """Name -> function and what it does."""
+
+
+ACCELEROMETERS_ONLY: Final = ("padgaonkar", "ninacc", "six-accelerometers", "product-free")
+"""Methods that do not use rate sensors."""
 
 
 def method_named(name: str) -> Method:

@@ -1,9 +1,9 @@
 """Does a triax more than needed read what the other channels predict for it? HIC and GSI decide [Alem77, sled test].
 
 The paper's deviations, HIC 0.29 % and GSI 0.80 %, are the tolerance. The instrument's own uncertainty may be larger
-than that; then a deviation beyond the tolerance proves nothing (JCGM 106: guard band U, k = 2). U has two parts: that
-of the prediction, from the whole-record fit, and that of the triax, from its stated gain, alignment and position by
-Monte Carlo (its zero is taken off before the event).
+than that; then a deviation beyond the tolerance proves nothing (JCGM 106: guard band U, k = 2), nor does one of which U
+is not known. U has two parts: that of the prediction by its method (motion_spread.py), and that of the triax, from its
+stated gain, alignment and position by Monte Carlo (its zero is taken off before the event).
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from nineaudit.case import Case
 from nineaudit.estimate.calibration import perpendiculars
 from nineaudit.estimate.motion import Motion
 from nineaudit.finding import COVERAGE_FACTOR, Verdict
-from nineaudit.motion import DRAWS, SEED, Kinematics, Start, motion_of
+from nineaudit.motion import DRAWS, Kinematics, Start, motion_of
+from nineaudit.motion_spread import SEED
 from nineaudit.physics import injury, kinematics, rigid_body
 from nineaudit.recording import Recording
 from nineaudit.rig import Point
@@ -41,11 +42,11 @@ class Judged:
 
     @property
     def verdict(self) -> Verdict:
-        """PASS within the tolerance, FAIL beyond tolerance and U, INCONCLUSIVE between."""
+        """PASS within the tolerance, FAIL beyond tolerance and U, INCONCLUSIVE between, or where U is not known."""
         size = abs(self.deviation)
         if size <= self.tolerance:
             return Verdict.PASS
-        return Verdict.INCONCLUSIVE if self.U is not None and size <= self.tolerance + self.U else Verdict.FAIL
+        return Verdict.INCONCLUSIVE if self.U is None or size <= self.tolerance + self.U else Verdict.FAIL
 
 
 @dataclass(frozen=True)
@@ -122,13 +123,5 @@ def _displaced(motion: Kinematics, axes: FloatArray, errors: FloatArray) -> Floa
 
 def _without(recording: Recording, columns: Sequence[int], point: FloatArray) -> Recording:
     """The recording less some channels, its rig with one point."""
-    kept = [k for k in range(len(recording.channels)) if k not in columns]
-    rig = replace(recording.rig, array=recording.rig.array.select(kept), points=(Point("triax", point),))
-    return replace(
-        recording,
-        rig=rig,
-        readings=recording.readings[:, kept],
-        valid=recording.valid[:, kept],
-        native=tuple(recording.native[k] for k in kept),
-        clocks=tuple(recording.clocks[k] for k in kept),
-    )
+    left = recording.only([k for k in range(len(recording.channels)) if k not in columns])
+    return replace(left, rig=replace(left.rig, points=(Point("triax", point),)))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import hypot, sqrt
 from pathlib import Path
 
@@ -144,3 +144,18 @@ class Recording:
     def column(self, channel: str) -> FloatArray:
         """(n,) readings of one channel, SI."""
         return self.readings[:, self.rig.array.index(channel)]
+
+    def only(self, columns: Sequence[int]) -> Recording:
+        """The recording of some channels (`columns` of the arrays, in that order), with the rig of these."""
+        held = list(columns)
+        rig = replace(self.rig, array=self.rig.array.select(held))
+        return replace(
+            self,
+            rig=rig,
+            readings=self.readings[:, held],
+            valid=self.valid[:, held],
+            native=tuple(self.native[k] for k in held),
+            clocks=tuple(self.clocks[k] for k in held),
+            resampled=tuple(c for c in self.resampled if c in rig.array.channels),
+            alignments=tuple(a for a in self.alignments if a.channel in rig.array.channels),
+        )

@@ -103,7 +103,7 @@ def estimate_motion(
     if has_rates(array):
         valid = np.isfinite(readings[:, gyros])
         measured = rates_omega(array.axes[gyros], readings[:, gyros], sigma[gyros], valid)
-        found = _with_accelerations(bridge(measured, time), positions, axes, readings[:, accelerometers], time)
+        found = with_accelerations(bridge(measured, time), positions, axes, readings[:, accelerometers], time)
         return replace(found, known=np.asarray(np.isfinite(measured).all(axis=1)))
     combination = rigid_body.product_free_alpha(positions, axes, leak=OFF_IDEAL)
     if rest_index is None:
@@ -118,9 +118,11 @@ def estimate_motion(
     return Motion(omega, alpha, a0, "product-free α integrated from rest")
 
 
-def _with_accelerations(
+def with_accelerations(
     omega: FloatArray, positions: FloatArray, axes: FloatArray, readings: FloatArray, time: FloatArray
 ) -> Motion:
+    """ω (n,3) with α and a0 of the accelerometers at `positions` (a,3) along `axes` (a,3), `readings` (n,a); where they
+    do not tell α it is dω/dt, and a0 is NaN where their axes do not span."""
     design = rigid_body.design(positions, axes)
     rank = int(np.linalg.matrix_rank(design, tol=1e-6)) if len(design) else 0
     if rank == 6:

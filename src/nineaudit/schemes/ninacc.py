@@ -129,6 +129,15 @@ def forward(
     return Motion(omega, state[:, 3:], state[:, :3], method + _poor(solved.condition))
 
 
+def poor(positions: FloatArray, axes: FloatArray) -> str:
+    """A warning where accelerometers at `positions` (k,3) along `axes` (k,3) hardly determine α, or nothing of it, with
+    rank and condition number of H; else the empty string."""
+    try:
+        return _poor(solver(positions, axes).condition).removeprefix("; ")
+    except EstimationError as error:
+        return str(error)
+
+
 def _poor(condition: float) -> str:
     """A warning where the layout hardly determines α, else nothing."""
     if condition <= POOR_CONDITION:
