@@ -2,19 +2,21 @@
 
 A channel is named when it holds the posterior against every other at 99 to 1, when the record without its fault costs
 what a healthy one does, and, where its fault is a mere waveform, when the motion also tells that waveform from a free
-one in any other channel. Otherwise those that are left are a group, and no name is given inside it.
+one in any other channel. Otherwise those that are left are a group, and no name is given inside it. Nor is one given
+where a cause common to many channels (estimate/common.py) explains the record about as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from nineaudit.case import Case
 from nineaudit.diagnosis import SEPARATION, Candidate, Diagnosis, Status
-from nineaudit.estimate.hypotheses import Hypothesis, theta_for
+from nineaudit.estimate.common import Common, common_causes, mostly_explained
+from nineaudit.estimate.hypotheses import Hypothesis, log_evidence, theta_for
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.search import FAR, Search
 from nineaudit.estimate.separation import DETECTION_NATS, claimed, smallest
@@ -51,6 +53,8 @@ def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
         return _nothing_found(search, base)
     candidates = _candidates(case, search, best, evidence)
     floor = _floor(search)
+    if common := _common(search, best):
+        return _no_channel(case, search, base, common, candidates)
     at = f"{best.statistic:.2f} per degree of freedom, {search.healthy.statistic:.3g} with it at its word"
     if (best.statistic > UNEXPLAINED * floor and best.word not in WAVEFORMS) or floor > UNEXPLAINED:
         reason = f"something is wrong, but no fault of one or two channels explains it: at best {at}"
@@ -77,6 +81,41 @@ def _best(search: Search) -> Hypothesis | None:
         return None
     top, enough = search.found[0], UNEXPLAINED * _floor(search)
     return next((x for x in search.found if x.channels == top.channels and x.statistic <= enough), top)
+
+
+def _common(search: Search, best: Hypothesis) -> list[Common]:
+    """The common causes that explain the record better than any channel does, or so nearly that 99 to 1 is missing."""
+    if mostly_explained(search.healthy, best):
+        return []
+    least = max(search.found[0].evidence - ODDS_NATS * _floor(search), DETECTION_NATS)
+    found = common_causes(search.healthy, best, log_evidence(search.healthy))
+    return [x for x in found if x.found.evidence >= least]
+
+
+def _no_channel(
+    case: Case, search: Search, base: Diagnosis, common: Sequence[Common], channels: Sequence[Candidate]
+) -> Diagnosis:
+    """No name, and no group, one of which would be the culprit: the common causes beside the channels."""
+    top, best = max(common[0].found.evidence, search.found[0].evidence), search.found[0].evidence
+    weight = [float(np.exp(max((x.found.evidence - top) / _floor(search), -700.0))) for x in common]
+    rest = float(np.exp(max((best - top) / _floor(search), -700.0))) / channels[0].probability
+    total = sum(weight) + rest
+    shared = [
+        Candidate(
+            tuple(case.array.channels[c] for c in x.found.channels), x.found.word, w / total, x.found.statistic,
+            dict(x.found.parameters),
+        )
+        for x, w in zip(common, weight, strict=True)
+    ]  # fmt: skip
+    alone = [replace(c, probability=c.probability * rest / total) for c in channels]
+    found = sorted([*shared, *alone], key=lambda c: -c.probability)
+    at = f"{common[0].found.statistic:.2f} per degree of freedom, {search.healthy.statistic:.3g} as it stands"
+    rivals = [" and ".join(c.channels) for c in alone if c.probability > 0.01]
+    said = common[0].cause.said
+    if common[0].found.statistic > UNEXPLAINED:
+        said = f"something is wrong that no fault of one or two channels explains; nearest: {said}"
+    reason = f"{said} ({at})" + (f", unless it is {' or '.join(rivals)} alone" if rivals else "")
+    return replace(base, status=Status.UNDIAGNOSED, candidates=tuple(found), reason=reason)
 
 
 def _shown(case: Case, search: Search, evidence: Mapping[str, str]) -> list[Hypothesis]:
