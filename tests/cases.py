@@ -22,6 +22,7 @@ frames = 1000
 what = "a container cannot be inflated"
 place = "byte 4711"
 [case.bus]                    # what was on a CAN bus (tests/bus_logs.py)
+[case.provenance]             # the record of a repair that comes with the file
 [[case.waiver]]               # as in a waiver file
 rule = "RQ202"
 """
@@ -41,6 +42,7 @@ from bus_logs import bus_from
 from nineaudit.case import Case
 from nineaudit.engine import run
 from nineaudit.finding import Finding
+from nineaudit.provenance import Provenance
 from nineaudit.readers.assemble import assemble
 from nineaudit.readers.contents import Contents
 from nineaudit.recording import Damage, Recording
@@ -53,7 +55,7 @@ FOLDER = Path(__file__).parents[1] / "fixtures" / "cases"
 TODAY = dt.date(2026, 6, 1)
 KEYS = {
     "name", "motion", "verdict", "channels", "preset", "rig", "faults", "seed", "rate", "imperfect", "noise",
-    "duration", "gravity", "arms", "record", "counts", "damage", "bus", "waiver",
+    "duration", "gravity", "arms", "record", "counts", "damage", "bus", "waiver", "provenance",
 }  # fmt: skip
 
 
@@ -81,7 +83,8 @@ def recording_of(case: Mapping[str, Any]) -> Recording:
     disturbed = _disturbed(simulated, case["record"], case.get("seed", 0)) if "record" in case else simulated
     bus = bus_from(case["bus"]) if "bus" in case else None
     damage = tuple(Damage(**place) for place in case.get("damage", ()))
-    source = replace(disturbed.source, counts=case.get("counts", {}), damage=damage)
+    record = Provenance(case["provenance"], "T0001.csv.provenance.json") if "provenance" in case else None
+    source = replace(disturbed.source, counts=case.get("counts", {}), damage=damage, provenance=record)
     return replace(disturbed, bus=bus, source=source)
 
 

@@ -195,11 +195,14 @@ class Case:
 
     @cached_property
     def fit_data(self) -> Data:
-        """What the whole-record fit sees: the blocks of `condensed`, ω = 0 known over the quiet interval."""
+        """What the whole-record fit sees: the blocks of `condensed`, ω = 0 known over the quiet interval; without what
+        was made of other channels."""
         rest = None
         if self.rest is not None:
             rest = (self.rest.start // self.condensed.length, self.rest.stop // self.condensed.length)
-        return make_data(self.array, self.condensed, rest)
+        data = make_data(self.array, self.condensed, rest)
+        made = condense.marked_blocks(self.recording.made_of_others, self.condensed.length)
+        return replace(data, weight=np.where(made, 0.0, data.weight)) if made.any() else data
 
     @property
     def onset(self) -> int:
@@ -261,9 +264,7 @@ class Case:
     @property
     def flagged_blocks(self) -> BoolArray:
         """(m,k) blocks of `condensed` that hold a flagged sample."""
-        length = self.condensed.length
-        whole = len(self.condensed.time) * length
-        return np.asarray(self.flagged[:whole].reshape(-1, length, len(self.array)).any(axis=1))
+        return condense.marked_blocks(self.flagged, self.condensed.length)
 
     @cached_property
     def nap_problem(self) -> closed_form.Problem | None:

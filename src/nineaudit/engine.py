@@ -20,6 +20,8 @@ from nineaudit.waivers import Waiver, apply_waivers, judge_waivers
 
 ENGINE_CODES = frozenset({WAIVER_CODE})
 """Rules that speak of findings, not of recordings: their functions are not in CHECKS."""
+_COMPARING = "RB"
+"""Family of the rules that hold channels against each other."""
 
 
 def run(
@@ -38,6 +40,7 @@ def run(
     checks = bind(rulebook)
     units = case.recording.rig.units
     raw = [f for rule in rulebook.rules if rule.code in checks for f in _apply(rule, checks[rule.code], case, units)]
+    raw = [_with_made(finding, case) for finding in raw]
     path, day = case.recording.source.path, today or dt.date.today()
     found = list(apply_waivers(raw, waivers or (), path, units, day))
     if WAIVER_CODE in rulebook:
@@ -118,6 +121,15 @@ def _apply(rule: Rule, check: Check, case: Case, units: UnitNames) -> list[Findi
         nothing = "the recording has nothing that this rule speaks of"
         return [Finding(rule.code, Verdict.NOT_APPLICABLE, rule.severity, nothing)]
     return [_judge(rule, measure, units) for measure in measures]
+
+
+def _with_made(finding: Finding, case: Case) -> Finding:
+    """The finding; where it compares channels and one of them was made of the others, it says so."""
+    made = dict.fromkeys(made.channel for made in case.recording.remade if made.from_others)
+    if not made or finding.measure is None or not finding.rule.startswith(_COMPARING):
+        return finding
+    said = f"{finding.reason}; where {', '.join(made)} was made of the other channels, it is no evidence"
+    return finding.with_verdict(finding.verdict, said)
 
 
 def _judge(rule: Rule, measure: Measure, units: UnitNames) -> Finding:

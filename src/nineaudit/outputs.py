@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from nineaudit.errors import ConfigurationError
+from nineaudit.files import write_whole
 
 STEM: Final = "{stem}"
 
@@ -66,10 +67,10 @@ def make_folder(path: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text in UTF-8; its folder is made. ConfigurationError where that cannot be."""
+    """Write a text in UTF-8, whole or not at all; its folder is made. ConfigurationError where that cannot be."""
     make_folder(path.parent)
     try:
-        path.write_text(text, encoding="utf-8", newline="\n")
+        write_whole(path, text)
     except OSError as error:
         raise unwritable(path, error) from error
 

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import hypot, sqrt
 from pathlib import Path
 
+import numpy as np
+
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.bus import Bus
+from nineaudit.provenance import Provenance, Remade
 from nineaudit.rig import Rig
 
 
@@ -92,7 +96,8 @@ class Damage:
 class Source:
     """The file that was read. `counts`: what its container held (frames, error frames, ...); `notes`: in words;
     `damage`: what of it could not be read. `parts`: every file, where the recording has several; `path`, `sha256` and
-    `size` are then those of the first."""
+    `size` are then those of the first. `provenance`: the record that says which readings are made, not measured; None
+    where there is none."""
 
     path: Path
     format: str
@@ -103,6 +108,7 @@ class Source:
     notes: tuple[str, ...] = ()
     damage: tuple[Damage, ...] = ()
     parts: tuple[Source, ...] = ()
+    provenance: Provenance | None = None
 
     @property
     def files(self) -> tuple[Source, ...]:
@@ -134,6 +140,22 @@ class Recording:
     @property
     def channels(self) -> tuple[str, ...]:
         return self.rig.array.channels
+
+    @property
+    def remade(self) -> tuple[Remade, ...]:
+        """What repairs made in the channels, the oldest first."""
+        found = [made for file in self.source.files if file.provenance for made in file.provenance.remade]
+        return tuple(made for made in found if made.channel in self.channels)
+
+    @cached_property
+    def made_of_others(self) -> BoolArray:
+        """(n,k) samples that a repair made of the other channels: that they agree with those is no evidence."""
+        made, half = np.zeros(self.readings.shape, dtype=np.bool_), 0.5 / self.rate
+        for remade in self.remade:
+            if remade.from_others:
+                inside = [(self.time > a - half) & (self.time < b + half) for a, b in remade.stretches]
+                made[:, self.rig.array.index(remade.channel)] |= np.logical_or.reduce(inside) if inside else True
+        return made
 
     @property
     def rate(self) -> float:

@@ -1,11 +1,12 @@
-"""A new file with the faulty channel rebuilt, and beside it what was done. The original is never written to."""
+"""A new file with the faulty channel rebuilt, and beside it what was done. The original is never written to.
+
+An MCAP log keeps every byte: what is rebuilt gets a topic of its own, and the record stands in the log as well.
+"""
 
 from __future__ import annotations
 
-import json
-import math
-import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,20 @@ from nineaudit.array import FloatArray
 from nineaudit.auditing import Audit, mend
 from nineaudit.diagnose import Status
 from nineaudit.errors import ConfigurationError, RecordingError
+from nineaudit.files import partial_name, write_whole
+from nineaudit.provenance import path_beside, to_text
 from nineaudit.readers import fingerprint
 from nineaudit.reconstruct import Reconstruction
-from nineaudit.recording import Source
-from nineaudit.writers import write_recording
+from nineaudit.recording import Recording
+from nineaudit.repair_record import provenance, readings_to_write
+from nineaudit.signals import in_unit
+from nineaudit.writers import Outcome, encode, place
+from nineaudit.writers.mcap_rebuilt import Column, NotWhole, add_rebuilt, log_time_of_zero
 
-SCHEMA = "nineaudit/provenance/1"
+__all__ = ["provenance_path", "repair", "repaired_readings"]
+
+provenance_path = path_beside
+repaired_readings = readings_to_write
 
 
 def repair(
@@ -36,88 +45,115 @@ def repair(
     now: datetime | None = None,
 ) -> Path:
     """Write the recording with one channel (two that were swapped) repaired to `output`, and `output`.provenance.json;
-    returns the latter.
+    returns the latter. Both appear whole, or what was there stays.
 
     `channel` None: what the diagnosis isolated. ConfigurationError when nothing was isolated and no
     channel is given (a group is never repaired on its own), or when a file is in the way and `force` is not set;
     EstimationError when the channel cannot be rebuilt; RecordingError when the original changed meanwhile.
     """
-    made = provenance_path(output)
-    for path in (output, made):
+    beside = path_beside(output)
+    for path in (output, beside):
         if path.exists() and not force:
             raise ConfigurationError(
                 "the file exists", file=path, advice="choose another --output, or overwrite it with --force"
             )
     rebuilt = _reconstruction(audit, channel)
-    write_recording(audit.recording, output, dbc=dbc, readings=repaired_readings(audit, rebuilt), force=force)
-    original = audit.recording.source
-    if original.path.exists() and fingerprint(original.path)[1] != original.sha256:
-        output.unlink()
-        raise RecordingError(
-            "the original has changed since it was read, and the repair was taken back",
-            file=original.path,
-            advice="run the repair again",
-        )
-    document = provenance(audit, rebuilt, output, reason, by, datetime.now(UTC) if now is None else now)
-    _write_atomically(made, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    return made
+    document = provenance(audit, rebuilt, reason, by, datetime.now(UTC) if now is None else now)
+
+    def make(unnamed: Path) -> Outcome:
+        outcome = _written(audit, rebuilt, unnamed, dbc, document)
+        _require_unchanged(audit.recording)
+        if output.suffix.lower() != ".mme":
+            _record(beside, document, output.name, unnamed)
+        return outcome
+
+    with _kept(beside):
+        place(output, audit.recording, make, force=force)
+        if output.suffix.lower() == ".mme":  # the names of its files are in its hash
+            _record(beside, document, output.name, output)
+    return beside
 
 
-def provenance_path(output: Path) -> Path:
-    return output.with_name(output.name + ".provenance.json")
+def _record(beside: Path, document: Mapping[str, Any], name: str, file: Path) -> None:
+    """Write the record of a file that is to be called `name`."""
+    original = {key: document[key] for key in ("schema", "original")}
+    output = {"path": name, "sha256": fingerprint(file)[1]}
+    write_whole(beside, to_text({**original, "output": output, **document}))
 
 
-def repaired_readings(audit: Audit, rebuilt: Reconstruction) -> FloatArray:
-    """(n,k) SI: the recording as it was read, with the replaced samples rebuilt and their zero put back."""
-    out = audit.recording.readings.copy()
-    columns = [audit.recording.rig.array.index(c) for c in rebuilt.channels]
-    values = rebuilt.rebuilt + (audit.case.zero[columns] if rebuilt.zeros is None else rebuilt.zeros)
-    out[:, columns] = np.where(rebuilt.replaced, values, out[:, columns])
-    return out
+@contextmanager
+def _kept(path: Path) -> Iterator[None]:
+    """What follows may write a file; if it fails, the file is as it was."""
+    before = path.read_bytes() if path.exists() else None
+    done = False
+    try:
+        yield
+        done = True
+    finally:
+        if not done and before is not None:
+            path.write_bytes(before)
+        elif not done:
+            path.unlink(missing_ok=True)
 
 
-def _original(source: Source) -> dict[str, Any]:
-    return {"path": source.path.name, "sha256": source.sha256, "bytes": source.size, "altered": False}
+def _require_unchanged(recording: Recording) -> None:
+    """RecordingError when a file of the recording is not what it was when it was read."""
+    for source in recording.source.files:
+        there = source.path.exists()
+        if source.format == "simulation" and not there:
+            continue
+        if not there or fingerprint(source.path)[1] != source.sha256:
+            raise RecordingError(
+                "the original has changed since it was read, and the repair was taken back",
+                file=source.path,
+                found="no file" if not there else "another SHA-256",
+                expected=source.sha256,
+                advice="run the repair again",
+            )
 
 
-def provenance(
-    audit: Audit, rebuilt: Reconstruction, output: Path, reason: str, by: str, now: datetime
-) -> dict[str, Any]:
-    """What, from what, how, how well, by whom, when and with which software (ISO/IEC 17025 7.5, 7.11)."""
-    source, rig, diagnosis = audit.recording.source, audit.recording.rig, audit.diagnosis
-    return {
-        "schema": SCHEMA,
-        "original": _original(source) | ({"parts": [_original(part) for part in source.parts]} if source.parts else {}),
-        "output": {"path": output.name, "sha256": fingerprint(output)[1]},
-        "rig": {"name": rig.name, "sha256": rig.sha256},
-        "rulebook": {"sha256": audit.rulebook.sha256},
-        "channels": list(rebuilt.channels),
-        "interval_s": list(rebuilt.interval),
-        "samples_replaced": int(rebuilt.replaced.any(axis=1).sum()),
-        "samples": int(rebuilt.replaced.shape[0]),
-        "method": rebuilt.method,
-        "undone": _undone(rebuilt),
-        "donors": list(rebuilt.donors),
-        "u_rms": rebuilt.u_rms,
-        "unit": "m/s^2" if rig.array[rebuilt.channels[0]].kind == "accelerometer" else "rad/s",
-        "bound_ratio": rebuilt.bound_ratio if math.isfinite(rebuilt.bound_ratio) else None,
-        "diagnosis": {
-            "status": str(diagnosis.status),
-            "channels": list(diagnosis.channels),
-            "reason": diagnosis.reason,
-        },
-        "reason": reason,
-        "by": by,
-        "utc": now.astimezone(UTC).isoformat(timespec="seconds"),
-        "tool": dict(audit.tool),
-    }
+def _written(
+    audit: Audit, rebuilt: Reconstruction, path: Path, dbc: Sequence[Path] | None, document: Mapping[str, Any]
+) -> Outcome:
+    if path.suffix.lower() != ".mcap":
+        return encode(audit.recording, path, dbc, readings_to_write(audit, rebuilt))
+    source = audit.recording.source
+    if source.format == "mcap" and not source.parts and source.path.exists():
+        try:
+            return _added(audit, rebuilt, source.path, path, document)
+        except NotWhole:
+            path.unlink(missing_ok=True)
+    as_measured = partial_name(path)
+    try:
+        encode(audit.recording, as_measured)
+        return _added(audit, rebuilt, as_measured, path, document)
+    finally:
+        as_measured.unlink(missing_ok=True)
 
 
-def _undone(rebuilt: Reconstruction) -> dict[str, Any] | None:
-    """The fault that was undone by its model, its parameters and their standard uncertainties (SI); None: rebuilt."""
-    if rebuilt.fault is None:
-        return None
-    return {"fault": rebuilt.fault, "parameters": dict(rebuilt.parameters), "u": dict(rebuilt.parameters_u)}
+def _added(audit: Audit, rebuilt: Reconstruction, log: Path, path: Path, document: Mapping[str, Any]) -> Outcome:
+    """The log with the rebuilt channels on topics of their own."""
+    recording = audit.recording
+    topics = {s.signal.partition(":")[0] for s in recording.rig.array.sensors if ":" in s.signal}
+    first = min(float(trace.time[0]) for trace in recording.native)
+    readings = readings_to_write(audit, rebuilt)
+    columns = [_column(audit, rebuilt, readings, k) for k in range(len(rebuilt.channels))]
+    add_rebuilt(log, path, columns, document, log_time_of_zero(log, sorted(topics), first))
+    return Outcome()
+
+
+def _column(audit: Audit, rebuilt: Reconstruction, readings: FloatArray, k: int) -> Column:
+    """A rebuilt channel in the rig's unit."""
+    recording, channel = audit.recording, rebuilt.channels[k]
+    sensor = recording.rig.array[channel]
+    return Column(
+        channel=channel,
+        unit=sensor.unit,
+        time=recording.time,
+        values=in_unit(readings[:, recording.rig.array.index(channel)], sensor.to_si, sensor.offset),
+        u=np.abs(rebuilt.u[:, k] / sensor.to_si),
+        replaced=rebuilt.replaced[:, k],
+    )
 
 
 def _reconstruction(audit: Audit, channel: str | None) -> Reconstruction:
@@ -143,9 +179,3 @@ def _reconstruction(audit: Audit, channel: str | None) -> Reconstruction:
         file=audit.recording.source.path,
         advice="" if status is Status.HEALTHY else "if you know the channel from elsewhere, name it with --channel",
     )
-
-
-def _write_atomically(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    temporary.write_text(text, encoding="utf-8")
-    os.replace(temporary, path)

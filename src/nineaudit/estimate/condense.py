@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nineaudit.array import FloatArray
+from nineaudit.array import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +62,12 @@ def block_means(values: FloatArray, length: int) -> FloatArray:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Mean of empty slice", RuntimeWarning)
         return np.asarray(np.nanmean(blocks, axis=1))
+
+
+def marked_blocks(marked: BoolArray, length: int) -> BoolArray:
+    """(m,k) blocks of `length` samples that hold a marked one; the last few samples that fill no block are left out."""
+    whole = len(marked) // length * length
+    return np.asarray(marked[:whole].reshape(-1, length, marked.shape[1]).any(axis=1))
 
 
 def block_noise(sigma: FloatArray, rest: FloatArray | None, length: int, filtered: float | None = None) -> FloatArray:

@@ -14,17 +14,18 @@ from typing import TYPE_CHECKING, Final
 
 from nineaudit.errors import RecordingError
 from nineaudit.parts import in_order, part_of
+from nineaudit.provenance import Provenance, beside, path_beside
 from nineaudit.readers import mme_files
 from nineaudit.readers.assemble import assemble
 from nineaudit.readers.can_log import read_can
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.csv_table import read_text_table
 from nineaudit.readers.joined import join
-from nineaudit.readers.mcap_log import read_mcap
+from nineaudit.readers.mcap_rebuilt import read_repaired
 from nineaudit.readers.mdf_signals import read_mf4
 from nineaudit.readers.mme import read_mme
 from nineaudit.readers.parquet_table import read_parquet
-from nineaudit.recording import Recording, Source
+from nineaudit.recording import Damage, Recording, Source
 from nineaudit.signals import suggestion
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ READERS: Final[Mapping[str, Reader]] = {
     ".trc": read_can,
     ".mf4": read_mf4,
     ".db": read_can,
-    ".mcap": read_mcap,
+    ".mcap": read_repaired,
     ".mme": read_mme,
     ".zip": read_mme,
 }
@@ -109,6 +110,7 @@ def _read_file(path: Path, rig: Rig) -> tuple[Contents, Source]:
         size, sha256 = fingerprint(path)
         _require_kind(path, size)
         contents = reader(path, rig)
+        provenance, altered = _provenance(path, sha256, contents)
         unchanged = fingerprint(path)[1] == sha256
     except OSError as error:
         raise RecordingError(f"cannot be read: {error.strerror or error}", file=path) from error
@@ -120,9 +122,26 @@ def _read_file(path: Path, rig: Rig) -> tuple[Contents, Source]:
         unchanged_after_read=unchanged,
         counts=contents.counts,
         notes=contents.notes,
-        damage=contents.damage,
+        damage=(*contents.damage, *altered),
+        provenance=provenance,
     )
     return contents, source
+
+
+def _provenance(path: Path, sha256: str, contents: Contents) -> tuple[Provenance | None, tuple[Damage, ...]]:
+    """The record of a repair that stands in a file or beside it, and what is wrong where it is not that file's."""
+    outside = beside(path, sha256)
+    if contents.provenance is None and outside is None:
+        return None, ()
+    inside = None if contents.provenance is None else Provenance(contents.provenance, f"in {path.name}")
+    found = inside or outside
+    assert found is not None
+    if outside is None or outside.fits:
+        return found, ()
+    what = "this record is of a file with another hash: the file was altered after its repair, or is another"
+    return replace(found, fits=False), (
+        Damage(what, path_beside(path).name, lost="which readings are made is in doubt"),
+    )
 
 
 def _reader(path: Path) -> Reader:

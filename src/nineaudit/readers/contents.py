@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from nineaudit.bus import Bus
 from nineaudit.errors import RecordingError
@@ -13,14 +14,15 @@ from nineaudit.recording import Damage, Trace
 
 @dataclass(frozen=True)
 class Contents:
-    """Signals of a file, one a channel, as recorded; what its container held; what there is to say about it; and what
-    of it could not be read."""
+    """Signals of a file, one a channel, as recorded; what its container held; what there is to say about it; what
+    of it could not be read; and the record of a repair that stands in it."""
 
     traces: tuple[Trace, ...]
     counts: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     damage: tuple[Damage, ...] = ()
     bus: Bus | None = None
+    provenance: Mapping[str, Any] | None = None
 
 
 def cut_short(path: Path, why: str, what_was_read: str, *, place: str | None = None) -> RecordingError:

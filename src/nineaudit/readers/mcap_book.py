@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nineaudit.provenance import MCAP_RECORD
 from nineaudit.readers import mcap_parse as parse
 from nineaudit.readers.mcap_damage import Damages
 from nineaudit.readers.mcap_parse import Channel, Data, Malformed, Record, Schema
@@ -16,7 +17,8 @@ from nineaudit.signals import MCAP_ORIGIN
 
 @dataclass
 class Book:
-    """What a log says as it is read: definitions, messages by channel id, counts, ns to add to log times, damage."""
+    """What a log says as it is read: definitions, messages by channel id, counts, ns to add to log times, damage; the
+    `repair` that its metadata has the record of."""
 
     damages: Damages = field(default_factory=Damages)
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -27,6 +29,7 @@ class Book:
     unknown: int = 0
     unchecked: int = 0
     origin: int = 0
+    repair: str | None = None
     seen: int = 0
 
     @property
@@ -82,7 +85,9 @@ def _attachment(data: memoryview, record: Record, book: Book) -> None:
 
 def _metadata(data: memoryview, record: Record, book: Book) -> None:
     try:
-        _, found = parse.metadata(data, record)
+        name, found = parse.metadata(data, record)
+        if name == MCAP_RECORD:
+            book.repair = found.get("json", "")
         book.origin = int(found.get(MCAP_ORIGIN, book.origin))
     except (Malformed, ValueError) as error:
         book.damages.add(f"metadata: {error}", record.at)

@@ -16,6 +16,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray, frozen
 from nineaudit.errors import RecordingError
+from nineaudit.provenance import parse
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.mcap_book import Book
 from nineaudit.readers.mcap_columns import Column
@@ -41,7 +42,7 @@ def read_mcap(path: Path, rig: Rig) -> Contents:
     """
     book = Book()
     topics = Topics(rig, path, book)
-    for batch in batches(_mapped(path), book, topics.wanted):
+    for batch in batches(mapped(path), book, topics.wanted):
         topics.take(batch)
     if not book.count:
         raise _nothing(path, book)
@@ -57,10 +58,12 @@ def read_mcap(path: Path, rig: Rig) -> Contents:
         "messages_without_time": sum(int(np.count_nonzero(~timed)) for _, timed in clocks.values()),
         "invalid_values": sum(int(np.count_nonzero(np.isnan(t.values))) for t in traces),
     }
-    return Contents(tuple(traces), counts, (*notes, *_notes(book, rig, used)), book.damages.all())
+    repair = None if book.repair is None else parse(book.repair, path)
+    notes = (*notes, *_notes(book, rig, used))
+    return Contents(tuple(traces), counts, notes, book.damages.all(), provenance=repair)
 
 
-def _mapped(path: Path) -> memoryview:
+def mapped(path: Path) -> memoryview:
     """A file's bytes, read as they are needed. Raises RecordingError where it is no MCAP file."""
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:

@@ -80,16 +80,36 @@ def _tool(tool: Mapping[str, str]) -> dict[str, Any]:
 def _recording(recording: Recording) -> dict[str, Any]:
     source, time = recording.source, recording.time
     span = float(time[-1] - time[0]) if len(time) else 0.0
-    return {
-        "path": source.path.as_posix(),
-        "sha256": source.sha256,
-        "bytes": source.size,
-        "format": source.format,
-        "samples": len(time),
-        "duration_s": instant(span),
-        "rate_hz": plain(recording.rate) if len(time) > 1 else None,
-        "unchanged_after_read": source.unchanged_after_read,
-    } | ({"parts": [_file(part) for part in source.parts]} if source.parts else {})
+    return (
+        {
+            "path": source.path.as_posix(),
+            "sha256": source.sha256,
+            "bytes": source.size,
+            "format": source.format,
+            "samples": len(time),
+            "duration_s": instant(span),
+            "rate_hz": plain(recording.rate) if len(time) > 1 else None,
+            "unchanged_after_read": source.unchanged_after_read,
+        }
+        | _reconstructed(recording)
+        | ({"parts": [_file(part) for part in source.parts]} if source.parts else {})
+    )
+
+
+def _reconstructed(recording: Recording) -> dict[str, Any]:
+    """The channels that are not as measured, by the record of their repair; nothing where all are."""
+    rows = [
+        {
+            "channel": made.channel,
+            "samples": made.samples,
+            "interval": [instant(made.stretches[0][0]), instant(made.stretches[-1][1])] if made.stretches else None,
+            "method": made.method,
+            "independent": not made.from_others,
+            "original_sha256": made.original,
+        }
+        for made in recording.remade
+    ]
+    return {"reconstructed": rows} if rows else {}
 
 
 def _file(source: Source) -> dict[str, Any]:

@@ -27,6 +27,7 @@ def identity(audit: Audit) -> list[tuple[str, str]]:
         ("Samples", f"{len(time)}{rate}"),
         ("Time", f"{seconds(float(time[0]))} to {seconds(float(time[-1]))}"),
         ("Filter class", recording.rig.filter_class),
+        *(("Reconstructed, not measured", made.channel) for made in recording.remade),
         ("Report number", number(audit)),
     ]
 
@@ -46,11 +47,23 @@ def provenance(audit: Audit) -> list[tuple[str, str, bool]]:
     return [
         *(row for file in source.files for row in _file(file)),
         ("Original altered", altered, False),
+        *(row for made in _remade(audit) for row in made),
         *((f"Reader's note {i}", note, False) for i, note in enumerate(source.notes, 1)),
         ("Rig file", rig.path.as_posix() if rig.path else "given as text", True),
         ("SHA-256 of the rig file", rig.sha256, True),
         ("SHA-256 of the rules", audit.rulebook.sha256, True),
         *((_PACKAGES.get(name, name), version, False) for name, version in audit.tool.items()),
+    ]
+
+
+def _remade(audit: Audit) -> list[list[tuple[str, str, bool]]]:
+    """What of the recording is made, not measured: rows of each repair."""
+    return [
+        [
+            ("Reconstructed, not measured", f"{made.channel}: {made.samples} samples; {made.method}", False),
+            ("SHA-256 of the original of that", made.original, True),
+        ]
+        for made in audit.recording.remade
     ]
 
 

@@ -41,7 +41,15 @@ def summary(audit: Audit) -> str:
     counts = {v: sum(f.verdict is v for f in audit.findings) for v in Verdict}
     tally = ", ".join(f"{n} {v.replace('_', ' ')}" for v, n in counts.items() if n)
     verdict = str(audit.verdict).replace("_", " ").upper()
-    return _on_a_line(f"{verdict}: {diagnosis_sentence(audit.diagnosis)} ({tally})")
+    return _on_a_line(f"{verdict}: {diagnosis_sentence(audit.diagnosis)}{_remade(audit)} ({tally})")
+
+
+def _remade(audit: Audit) -> str:
+    """What is not as measured, as the end of a sentence."""
+    names = tuple(dict.fromkeys(made.channel for made in audit.recording.remade))
+    if not names:
+        return ""
+    return f"; {joined(names)} {'is' if len(names) == 1 else 'are'} reconstructed, not measured"
 
 
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:

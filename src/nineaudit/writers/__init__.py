@@ -6,7 +6,7 @@ of the recording it comes from.
 
 from __future__ import annotations
 
-import os
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError
+from nineaudit.files import partial_name, settle
 from nineaudit.recording import Recording
 from nineaudit.signals import suggestion
 from nineaudit.writers.can_file import write_asc, write_blf
@@ -25,7 +26,7 @@ from nineaudit.writers.mme_file import write_mme, write_mme_zip
 from nineaudit.writers.outcome import Outcome
 from nineaudit.writers.table_file import write_csv, write_parquet
 
-__all__ = ["WRITERS", "Written", "make_dbc", "write_recording"]
+__all__ = ["WRITERS", "Outcome", "Written", "encode", "make_dbc", "place", "write_recording"]
 
 Writer = Callable[[Recording, FloatArray, Path, Sequence[Path]], Outcome]
 """(recording, (n,k) SI readings, file, databases) -> what became of the numbers."""
@@ -68,22 +69,45 @@ def write_recording(
     that is. Raises ConfigurationError: unknown suffix, the file exists (unless `force`) or is the recording's own
     source, a folder that is not there, values that a CAN signal cannot hold.
     """
-    path = Path(path)
-    writer = _writer(path)
-    _require_free(path, [source.path for source in recording.source.files], force)
+    databases = dbc if dbc is None or not isinstance(dbc, (str, Path)) else [dbc]
+    return place(Path(path), recording, lambda partial: encode(recording, partial, databases, readings), force=force)
+
+
+def encode(
+    recording: Recording,
+    path: Path,
+    dbc: Sequence[str | Path] | None = None,
+    readings: FloatArray | None = None,
+) -> Outcome:
+    """Write a recording to a file that is not there yet, which is not yet the one that a user asked for; else as
+    write_recording. OSError."""
     recording = replace(recording, rig=recording.rig.in_one_file())
     values = recording.readings if readings is None else np.asarray(readings, dtype=np.float64)
     if values.shape != recording.readings.shape:
         raise ValueError(f"readings {values.shape} for a recording of {recording.readings.shape}")
-    databases = recording.rig.dbc if dbc is None else [dbc] if isinstance(dbc, (str, Path)) else dbc
-    partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    databases = recording.rig.dbc if dbc is None else dbc
+    return _writer(path)(recording, values, path, [Path(p) for p in databases])
+
+
+def place(path: Path, recording: Recording, make: Callable[[Path], Outcome], *, force: bool = False) -> Written:
+    """A file made from a recording: `make` writes it under another name in the same folder, and once it is whole and
+    on the disk it takes its own. What `make` raises takes it back, and a file that was there stays.
+
+    ConfigurationError: as write_recording.
+    """
+    _writer(path)
+    _require_free(path, [source.path for source in recording.source.files], force)
+    partial, outcome, whole = partial_name(path), Outcome(), False
     try:
-        outcome = writer(recording, values, partial, [Path(p) for p in databases])
-        os.replace(partial, path)
+        outcome = make(partial)
+        settle(partial, path)
+        whole = True
     except OSError as error:
         raise ConfigurationError(f"cannot be written: {error.strerror or error}", file=path) from error
     finally:
         partial.unlink(missing_ok=True)
+        for folder in () if whole else outcome.folders:
+            shutil.rmtree(folder, ignore_errors=True)
     return Written(path, outcome.error, outcome.notes)
 
 

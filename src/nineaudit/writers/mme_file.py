@@ -8,6 +8,7 @@ import re
 import shutil
 import zipfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -60,7 +61,7 @@ def write_mme(recording: Recording, readings: FloatArray, path: Path, _: Sequenc
         partial.rename(folder)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
-    return outcome
+    return replace(outcome, folders=(folder,))
 
 
 def _stem(path: Path) -> str:
