@@ -201,7 +201,7 @@ def test_junit_never_passes_what_was_not_decided(verdict: Verdict) -> None:
 def test_junit_skips_what_is_waived() -> None:
     finding = Finding("RB301", Verdict.WAIVED, Severity.ERROR, "waived by A. Example")
     text = report.junit([replace(example(201), findings=(finding,))])
-    assert '<skipped message="waived by A. Example"' in text
+    assert '<skipped message="waived RB301: waived by A. Example"' in text
 
 
 def test_annotations_are_escaped_and_ten() -> None:

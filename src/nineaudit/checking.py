@@ -159,10 +159,10 @@ def run(
         verdicts[outcome.verdict] += 1
         code = max(code, outcome.exit_code(fail_on))
     if not streamed:
-        show(_collected(style, kept))
+        show(_collected(style, kept, fail_on))
     for kind, file in files.collected:
         if file is not None:
-            write_text(file, _collected(kind, kept))
+            write_text(file, _collected(kind, kept, fail_on))
     if many:
         say(_tally(verdicts))
     return code
@@ -196,7 +196,7 @@ def _styled(outcome: Outcome, style: str) -> str:
     return (to_json if style == "json" else to_jsonl)(outcome.document())
 
 
-def _collected(kind: str, outcomes: Sequence[Outcome]) -> str:
+def _collected(kind: str, outcomes: Sequence[Outcome], fail_on: str) -> str:
     """One text about all recordings: json (a list), junit, github or markdown."""
     import json
 
@@ -207,8 +207,9 @@ def _collected(kind: str, outcomes: Sequence[Outcome]) -> str:
         return json.dumps(documents, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     audits = [outcome.audit for outcome in outcomes if outcome.audit is not None]
     unread = {outcome.path: str(outcome.error) for outcome in outcomes if outcome.error is not None}
-    write = {"junit": report.junit, "github": report.github, "markdown": report.markdown}[kind]
-    return write(audits, unread)
+    if kind == "junit":
+        return report.junit(audits, unread, fail_on)
+    return (report.github if kind == "github" else report.markdown)(audits, unread)
 
 
 def _tally(verdicts: Mapping[str, int]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
+from nineaudit.engine import gate
 from nineaudit.finding import Finding, Severity, Verdict
 from nineaudit.report.findings import NOTABLE, by_family, by_weight, channels, family_title
 from nineaudit.report.numbers import printable
@@ -21,23 +22,24 @@ Unread = Mapping[Path, str]
 
 WORST = 10
 SUMMARY_BYTES = 1 << 20
+LONGEST = 2_000
+"""Characters of one message of an annotation or a summary; names and reasons come from files of any size."""
 _UNDECIDED = frozenset({Verdict.INCONCLUSIVE, Verdict.NOT_EVALUATED})
-_SET_ASIDE = frozenset({Verdict.WAIVED, Verdict.NOT_APPLICABLE})
 
 
-def junit(audits: Sequence[Audit], unread: Unread | None = None) -> str:
+def junit(audits: Sequence[Audit], unread: Unread | None = None, fail_on: str = "error") -> str:
     """JUnit XML: a suite per recording, a case per rule family.
 
-    failure: a rule of the family fails. error: none fails, but one of severity error could not be decided,
-    which never counts as a pass. skipped: every rule is waived or does not apply. Other notable findings are
-    the case's output.
+    failure: a rule of the family fails, or with `fail_on` warning stops the gate. error: none does, but one of
+    severity error could not be decided, which never counts as a pass. skipped: a violation is waived, or no rule
+    applies. Other notable findings are the case's output.
     """
     root = ET.Element("testsuites", name="nineaudit")
     for audit in audits:
-        _suite(root, audit)
+        _suite(root, audit, fail_on)
     for path, reason in (unread or {}).items():
         suite = ET.SubElement(root, "testsuite", name=_xml(path.as_posix()))
-        case = ET.SubElement(suite, "testcase", classname=_xml(path.name), name="read the recording")
+        case = ET.SubElement(suite, "testcase", classname=_xml(path.as_posix()), name="read the recording")
         ET.SubElement(case, "error", message=_xml(reason), type="not_audited").text = _xml(reason)
     for suite in root:
         _count(suite)
@@ -45,27 +47,37 @@ def junit(audits: Sequence[Audit], unread: Unread | None = None) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _suite(root: ET.Element, audit: Audit) -> None:
-    source = audit.recording.source
-    suite = ET.SubElement(root, "testsuite", name=_xml(source.path.as_posix()))
+def _suite(root: ET.Element, audit: Audit, fail_on: str) -> None:
+    path = _xml(audit.recording.source.path.as_posix())
+    suite = ET.SubElement(root, "testsuite", name=path)
     for code, findings in by_family(audit.findings).items():
         name = f"{code} {family_title(code)}"
-        case = ET.SubElement(suite, "testcase", classname=_xml(source.path.name), name=_xml(name))
-        _outcome(case, by_weight(findings))
+        case = ET.SubElement(suite, "testcase", classname=path, name=_xml(name))
+        _outcome(case, by_weight(findings), fail_on)
 
 
-def _outcome(case: ET.Element, findings: list[Finding]) -> None:
-    text = [_xml(finding_line(f)) for f in findings if f.verdict in NOTABLE]
-    verdicts = {f.verdict for f in findings}
-    worst = findings[0]
-    if Verdict.FAIL in verdicts:
-        ET.SubElement(case, "failure", message=text[0], type=worst.rule).text = "\n".join(text)
-    elif any(f.verdict in _UNDECIDED and f.severity is Severity.ERROR for f in findings):
-        ET.SubElement(case, "error", message=text[0], type=str(worst.verdict)).text = "\n".join(text)
-    elif verdicts <= _SET_ASIDE:
-        ET.SubElement(case, "skipped", message=_xml(worst.reason))
+def _outcome(case: ET.Element, findings: list[Finding], fail_on: str) -> None:
+    """What became of a family, by the finding that decides it; every notable finding is in the text."""
+    text = "\n".join(_xml(finding_line(f)) for f in findings if f.verdict in NOTABLE)
+    tag, decisive = _decisive(findings, fail_on)
+    if decisive is not None:
+        message = finding_line(decisive) if decisive.verdict in NOTABLE else decisive.reason
+        kind = decisive.rule if tag == "failure" else str(decisive.verdict)
+        ET.SubElement(case, tag, message=_xml(message), type=kind).text = text or None
     elif text:
-        ET.SubElement(case, "system-out").text = "\n".join(text)
+        ET.SubElement(case, "system-out").text = text
+
+
+def _decisive(findings: list[Finding], fail_on: str) -> tuple[str, Finding | None]:
+    """The element of JUnit and the finding for it, the weightiest first; None for a family that passes."""
+    undecided = [f for f in findings if f.verdict in _UNDECIDED and f.severity is Severity.ERROR]
+    stopping = [f for f in findings if f.verdict is Verdict.FAIL or (f not in undecided and not gate([f], fail_on))]
+    waived = [f for f in findings if f.verdict is Verdict.WAIVED]
+    idle = findings if all(f.verdict is Verdict.NOT_APPLICABLE for f in findings) else []
+    for tag, found in (("failure", stopping), ("error", undecided), ("skipped", waived or idle)):
+        if found:
+            return tag, found[0]
+    return "", None
 
 
 def _count(suite: ET.Element) -> None:
@@ -99,7 +111,8 @@ def _worst(audits: Sequence[Audit]) -> list[tuple[Finding, Audit]]:
 
 def _command(level: str, path: Path, title: str, message: str) -> str:
     file = _escape_property(printable(path.as_posix()))
-    return f"::{level} file={file},title={_escape_property(title)}::{_escape_data(message)}"
+    said = "\n".join(map(printable, _short(message).splitlines()))
+    return f"::{level} file={file},title={_escape_property(_short(title))}::{_escape_data(said)}"
 
 
 def _escape_data(text: str) -> str:
@@ -125,7 +138,7 @@ def markdown(audits: Sequence[Audit], unread: Unread | None = None) -> str:
 
 def _within(head: list[str], rows: list[str], tail: list[str]) -> str:
     """As many rows as fit between head and tail; the rest is counted, not silently dropped."""
-    room = SUMMARY_BYTES - sum(len(line.encode()) + 1 for line in head + tail) - 100
+    room = SUMMARY_BYTES - 1 - sum(len(line.encode()) + 1 for line in head + tail) - 100
     kept, used = 0, 0
     while kept < len(rows) and (used := used + len(rows[kept].encode()) + 1) <= room:
         kept += 1
@@ -138,4 +151,10 @@ _MARKS = str.maketrans({mark: f"&#{ord(mark)};" for mark in "\\`*_[]|~@"})
 
 def _cell(text: str) -> str:
     """Text that Markdown and HTML leave alone."""
-    return html.escape(printable(text), quote=False).translate(_MARKS)
+    return html.escape(printable(_short(text)), quote=False).translate(_MARKS)
+
+
+def _short(text: str) -> str:
+    """At most `LONGEST` characters; what is left out is counted."""
+    left_out = len(text) - LONGEST
+    return text if left_out <= 0 else f"{text[:LONGEST]}… ({left_out} more characters)"
