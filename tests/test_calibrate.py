@@ -12,7 +12,7 @@ import pytest
 
 from calibration_sheets import Truth, draw, flips, right_angles, staircase, table, write_all
 from nineaudit import cli
-from nineaudit.array import frozen
+from nineaudit.array import SensorArray, frozen
 from nineaudit.calibrating import inputs, rig_text
 from nineaudit.calibrating.fit import Calibration, fit, student
 from nineaudit.calibrating.path import staircase as fit_path
@@ -476,3 +476,15 @@ def test_an_output_that_exists_needs_force(rig: Rig, run: Command, tmp_path: Pat
     call = ("calibrate", "rate-table", "table.csv", "--rig", "rig.toml", "--output", "new.toml")
     assert [run(*call)[0], run(*call)[0], run(*call, "--force")[0]] == [0, 2, 0]
     assert frozen(load_rig(tmp_path / "new.toml").array.values("scale")).min() > 0.8
+
+
+def test_readings_in_another_unit_are_named_and_not_taken_for_a_scale(rig: Rig, tmp_path: Path) -> None:
+    """Flips read in m/s² by a rig in g: scales near 9.81. A sensor that has such a scale states it."""
+    truth = draw(rig, 0)
+    wrong = replace(truth, vectors=truth.vectors * G0)
+    path = put(tmp_path, flips(rig, wrong, 0.0, 0))
+    with pytest.raises(EstimationError, match=r"channel .*: the readings are in m/s\^2, it seems, not in g_0.*scale"):
+        fits(rig, path)
+    stated = tuple(replace(s, scale=G0, to_si=s.to_si / G0) for s in rig.array.sensors)
+    own = replace(rig, array=SensorArray(stated))
+    assert all(abs(one.scale / G0 - 1.0) < 0.2 for one in fits(own, path).values())

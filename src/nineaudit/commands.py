@@ -178,3 +178,19 @@ def numbers(text: str | None, option: str) -> list[float] | None:
         raise ConfigurationError(
             "not a list of numbers", place=option, found=text, expected="numbers with commas between them"
         ) from error
+
+
+def only_channels(recording: Recording, text: str | None) -> Recording:
+    """The recording with the channels that `text` names (CH,..), all without. ConfigurationError: one is not known."""
+    if text is None:
+        return recording
+    names, known = [name.strip() for name in text.split(",")], recording.channels
+    unknown = [name for name in names if name not in known]
+    if unknown or len(set(names)) < len(names):
+        raise ConfigurationError(
+            "no such channel" if unknown else "a channel twice",
+            place="--channels",
+            found=unknown[0] if unknown else text,
+            expected="some of " + ", ".join(known),
+        )
+    return recording.only([known.index(name) for name in names])

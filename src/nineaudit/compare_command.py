@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from nineaudit.options import Dbc, Recording, RigOption, example
+from nineaudit.errors import ConfigurationError
+from nineaudit.options import Channels, Dbc, Recording, RigOption, example
 
 EXAMPLE = example("nineaudit compare T0001.csv --rig rig.toml --html schemes.html --json schemes.json")
 
@@ -16,6 +17,14 @@ Draws = Annotated[int, typer.Option(help="Of the instrument, for the budgets of 
 Class = Annotated[
     float | None,
     typer.Option(metavar="CLASS", help="Of all curves; default 180, unless the recording went through it; 0: none."),
+]
+Filter = Annotated[
+    str | None,
+    typer.Option(
+        "--filter",
+        metavar="KIND:VALUE",
+        help="Of all curves, in place of --cfc: four-pole:HZ, the Butterworth of Martin 1998, as four-pole:300.",
+    ),
 ]
 Html = Annotated[Path | None, typer.Option(metavar="F", help="Write the page with the curves.")]
 Json = Annotated[Path | None, typer.Option(metavar="F", help="Write the result for machines.")]
@@ -27,6 +36,8 @@ def compare(
     reference: Reference = None,
     draws: Draws = 16,
     cfc: Class = None,
+    curve_filter: Filter = None,
+    channels: Channels = None,
     dbc: Dbc = None,
     html: Html = None,
     json: Json = None,
@@ -38,16 +49,21 @@ def compare(
     """
     from nineaudit import comparison
     from nineaudit.case import Case
+    from nineaudit.commands import only_channels
+    from nineaudit.curve_filter import named
     from nineaudit.outputs import protect, write_text
     from nineaudit.readers import read
     from nineaudit.report import comparison_document, comparison_page
     from nineaudit.report.machine import to_json
     from nineaudit.rig import load_rig
 
+    if cfc is not None and curve_filter is not None:
+        raise ConfigurationError("two filters", place="--filter", found="--cfc too", expected="one of them")
+    other = None if curve_filter is None else named(curve_filter)
     instrument = load_rig(rig)
     protect([html, json], [*instrument.files(recording), rig, *(dbc or instrument.dbc)])
-    found = read(recording, instrument, dbc=dbc or ())
-    compared = comparison.compare(Case(found), reference, draws, cfc=cfc)
+    found = only_channels(read(recording, instrument, dbc=dbc or ()), channels)
+    compared = comparison.compare(Case(found), reference, draws, cfc=cfc, other=other)
     lines = comparison_page.lines(compared, found)
     if html is not None:
         write_text(html, comparison_page.render(compared, found))

@@ -3,7 +3,9 @@ rating, and differences against what the rig's uncertainties explain.
 
 The budget of a difference is its standard deviation over draws of the instrument (JCGM 101): every draw changes all
 readings by the calibration errors of calibration.columns, one standard deviation of each as the rig states it, and by
-noise, and every scheme runs on the same draw. So an error that two schemes share does not count between them.
+noise of the colour that the recording's class leaves, and every scheme runs on the same draw. So an error that two
+schemes share does not count between them. Each recording has draws of its own: drawn alike for all, a budget that
+comes out small by chance would be small for every recording of a rig.
 
     ratio = rms(curve − reference) / rms(u of the difference),   explained where ratio ≤ k = 2
 
@@ -14,17 +16,21 @@ J211-1: filter before operations that are not linear).
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from nineaudit import instrument_draws
 from nineaudit.array import FloatArray
 from nineaudit.case import Case
+from nineaudit.curve_filter import CurveFilter
 from nineaudit.errors import ConfigurationError, EstimationError
 from nineaudit.estimate import calibration
 from nineaudit.estimate.motion import Motion, bridge
+from nineaudit.gaps import require_short
 from nineaudit.physics import filters, rigid_body
 from nineaudit.rig import Point
 from nineaudit.scheme_runs import Scheme, remarks, schemes_of
@@ -70,7 +76,8 @@ class Row:
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """`curves` by scheme and quantity, each (m,3) SI on `time` (m,) s; `methods` in words; `rows` against
-    `reference`; `refused` schemes with the reason; `cfc` of all curves, None: unfiltered. `draws` of the instrument
+    `reference`; `refused` schemes with the reason; `cfc` of all curves, None: another filter or none,
+    which `filter` says in words. `draws` of the instrument
     behind the budgets. `remarks`: what the motion tells of the sensors besides."""
 
     time: FloatArray
@@ -82,6 +89,7 @@ class Comparison:
     cfc: float | None
     draws: int
     remarks: tuple[str, ...] = ()
+    filter: str = "unfiltered"
 
     @property
     def rate(self) -> float:
@@ -90,10 +98,16 @@ class Comparison:
 
 
 def compare(
-    case: Case, reference: str | None = None, draws: int = DRAWS, seed: int = SEED, cfc: float | None = None
+    case: Case,
+    reference: str | None = None,
+    draws: int = DRAWS,
+    seed: int = SEED,
+    cfc: float | None = None,
+    other: CurveFilter | None = None,
 ) -> Comparison:
     """Run every scheme on the block means of `case` and compare each with `reference`, by default the whole-record fit,
-    or else the first that runs. `cfc` of the curves: None is CLASS, unfiltered where that is too fast; 0 unfiltered.
+    or else the first that runs. `cfc` of the curves: None is CLASS, unfiltered where that is too fast; 0 unfiltered;
+    or the `other` filter in its place.
 
     Raises ConfigurationError for a reference that is no scheme or does not run, or fewer than two draws;
     EstimationError where fewer than two schemes run, or the blocks are too slow for a class that is asked for; also
@@ -102,8 +116,9 @@ def compare(
     if draws < 2:
         raise ConfigurationError("too few draws", place="--draws", found=draws, expected="2 or more")
     require_readings(case.array, case.recording.readings, each=True)
-    class_ = _class(case, cfc)
-    schemes = {name: _filtered(scheme, case, class_) for name, scheme in schemes_of(case).items()}
+    require_short(case.recording)
+    used = _filter(case, cfc, other)
+    schemes = {name: _filtered(scheme, case, used) for name, scheme in schemes_of(case).items()}
     readings = bridge(case.condensed.readings, case.condensed.time)
     motions, refused = _run(schemes, readings)
     chosen = _reference(reference, tuple(schemes), motions, refused)
@@ -122,7 +137,10 @@ def compare(
     ]
     methods = {name: motion.method for name, motion in motions.items()}
     told = remarks(case, curves[chosen]["omega"])
-    return Comparison(case.condensed.time, chosen, methods, curves, tuple(rows), refused, class_, len(spread), told)
+    class_ = used.value if used and used.kind == "cfc" else None
+    said = str(used or "unfiltered")
+    at = case.condensed.time
+    return Comparison(at, chosen, methods, curves, tuple(rows), refused, class_, len(spread), told, said)
 
 
 def outputs(motion: Motion, points: tuple[Point, ...]) -> dict[str, FloatArray]:
@@ -136,27 +154,29 @@ def unit_of(quantity: str) -> str:
     return {"alpha": "rad/s^2", "omega": "rad/s"}.get(quantity, "m/s^2")
 
 
-def _class(case: Case, cfc: float | None) -> float | None:
-    """The class of the curves: what is asked for, else CLASS where the samples are fast enough and a filter as recorded
-    leaves room for it."""
+def _filter(case: Case, cfc: float | None, other: CurveFilter | None) -> CurveFilter | None:
+    """The filter of the curves: what is asked for, else CLASS where the samples are fast enough and a filter as
+    recorded leaves room for it."""
     rate, already = _rate(case.condensed.time), case.recording.rig.cfc
-    if cfc is None:
-        return CLASS if filters.fast_enough(rate, CLASS) and (already is None or already > CLASS) else None
-    if cfc != 0.0:
-        filters.require_room(case.recording.rate, cfc, already)
-        filters.coefficients(cfc, rate)
-    return cfc or None
+    if cfc is None and other is None:
+        room = filters.fast_enough(rate, CLASS) and (already is None or already > CLASS)
+        return CurveFilter("cfc", CLASS) if room else None
+    if cfc == 0.0:
+        return None
+    asked = other or CurveFilter("cfc", cfc or CLASS)
+    asked.require(rate, case.recording.rate, already)
+    return asked
 
 
-def _filtered(scheme: Scheme, case: Case, class_: float | None) -> Scheme:
-    """The scheme with its curves through a class that the recording has not been through."""
-    if class_ is None:
+def _filtered(scheme: Scheme, case: Case, used: CurveFilter | None) -> Scheme:
+    """The scheme with its curves through a filter that the recording has not been through."""
+    if used is None:
         return scheme
     rate, already = _rate(case.condensed.time), case.recording.rig.cfc
 
     def run(readings: FloatArray) -> Motion:
         found = scheme(readings)
-        omega, alpha, a0 = (filters.once(v, rate, class_, already) for v in (found.omega, found.alpha, found.a0))
+        omega, alpha, a0 = (used(v, rate, already) for v in (found.omega, found.alpha, found.a0))
         return Motion(omega, alpha, a0, found.method)
 
     return run
@@ -202,18 +222,20 @@ def _drawn(
     """Motions by scheme for each draw of calibration errors and noise added to the readings; and the schemes that fail
     in one of them, with the reason: their budget cannot be told."""
     columns = calibration.all_columns(case.array, readings, case.condensed.time, motion)
-    rng = np.random.default_rng(seed)
+    rng = own_generator(case, seed)
     out: list[dict[str, Motion]] = []
     failed: dict[str, str] = {}
     for _ in range(draws):
-        errors = np.einsum("knp,kp->nk", columns, rng.standard_normal((len(case.array), columns.shape[2])))
-        noise = rng.standard_normal(readings.shape) * case.condensed.sigma
-        found, fails = _run(
-            {name: run for name, run in schemes.items() if name not in failed}, readings + errors + noise
-        )
+        changed = readings + instrument_draws.errors(columns, rng) + instrument_draws.block_noise(case, rng)
+        found, fails = _run({name: run for name, run in schemes.items() if name not in failed}, changed)
         failed |= {name: f"on readings changed within the rig's uncertainties: {why}" for name, why in fails.items()}
         out.append(found)
     return out, failed
+
+
+def own_generator(case: Case, seed: int) -> np.random.Generator:
+    """Random numbers of this recording: the same for the same readings, others for others."""
+    return np.random.default_rng([seed, zlib.crc32(np.ascontiguousarray(case.recording.readings).tobytes())])
 
 
 def _row(

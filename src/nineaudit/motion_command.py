@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nineaudit.errors import ConfigurationError
-from nineaudit.options import Dbc, Force, Recording, RigOption, example
+from nineaudit.options import Channels, Dbc, Force, Recording, RigOption, example
 
 if TYPE_CHECKING:
     from nineaudit.case import Case
@@ -89,6 +89,7 @@ def motion(
     gravity: Gravity = False,
     frame: Frame = None,
     cfc: Class = None,
+    channels: Channels = None,
     check_triax: CheckTriax = None,
     worst_case: WorstCase = None,
     gyro_response: GyroResponse = None,
@@ -103,6 +104,7 @@ def motion(
     uncertainties explain.
     """
     from nineaudit.case import Case
+    from nineaudit.commands import only_channels
     from nineaudit.motion import motion_of
     from nineaudit.motion_files import files_of, writer_of
     from nineaudit.motion_methods import method_named
@@ -121,7 +123,8 @@ def motion(
         require_absent(place, force)
     instrument = _framed(with_points(instrument, point or []), frame)
     start = _start(omega, angles, velocity, position, gravity)
-    case, notes = _filtered(Case(read(recording, instrument, dbc=dbc or ())), cfc)
+    chosen = only_channels(read(recording, instrument, dbc=dbc or ()), channels)
+    case, notes = _filtered(Case(chosen), cfc)
     found = motion_of(case, method, start)
     found = replace(found, notes=(*notes, *found.notes))
     lines = [*summary(found, instrument, recording.name), *_written(found, instrument, recording, output, html, force)]

@@ -35,4 +35,7 @@ Rules = Annotated[
     Path | None, typer.Option("--rules", metavar="DIR", help="Folder of rule sheets to add, or to put in place.")
 ]
 Output = Annotated[Path, typer.Option("--output", metavar="F", help="New file; its suffix is the format.")]
+Channels = Annotated[
+    str | None, typer.Option("--channels", metavar="CH,..", help="Only these channels of the rig, as a0x,a0y,a1z.")
+]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite the output if it exists.")]

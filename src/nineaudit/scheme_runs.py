@@ -10,7 +10,9 @@ import numpy as np
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.case import Case
 from nineaudit.errors import EstimationError
+from nineaudit.estimate import parity
 from nineaudit.estimate.motion import Motion, estimate_motion, has_rates
+from nineaudit.estimate.smoothed_rates import smoothed_rates
 from nineaudit.estimate.trajectory import Fit, fit
 from nineaudit.schemes import growth, martin, ninacc, rgla, takhounts
 from nineaudit.schemes.requirements import require_alpha
@@ -26,6 +28,8 @@ def schemes_of(case: Case) -> dict[str, Scheme]:
     fitted: list[Fit] = []
 
     def by_map(readings: FloatArray) -> Motion:
+        if has_rates(array) and not parity.tells_alpha(array):
+            return smoothed_rates(array, time, readings, sigma)
         require_alpha(array)
         data = replace(case.fit_data, readings=readings)
         fitted.append(fit(data, fitted[0].omega, fitted[0].theta) if fitted else case.healthy)

@@ -16,7 +16,10 @@ import numpy as np
 from nineaudit.array import FloatArray, Kind, Sensor
 from nineaudit.calibrating.sheet import unit_si
 from nineaudit.errors import EstimationError
+from nineaudit.units import FACTORS
 
+UNIT_SHARE = 0.15
+"""How near, as a logarithm, a scale comes to the ratio of two units to be taken for it."""
 _LEAST_SCALE = 1e-6
 """Of a connected sensor: a millionth of what the rig says."""
 WORST_CONDITION = 1000.0
@@ -96,6 +99,7 @@ def fit(sensor: Sensor, felt: FloatArray, readings: FloatArray, *, single: bool 
     slope, covariance = line.x[:-1], line.covariance[:-1, :-1]
     scale = float(np.linalg.norm(slope))
     _require_signal(sensor, scale, line)
+    _require_unit(sensor, scale)
     along = slope / scale
     axis = along[0] * sensor.axis if single else along
     spread = float(along @ covariance @ along)
@@ -128,6 +132,22 @@ def _require_signal(sensor: Sensor, scale: float, line: Line) -> None:
             expected="a sensitivity near 1",
             advice="is it the right column, is the channel connected?",
         )
+
+
+def _require_unit(sensor: Sensor, scale: float) -> None:
+    """EstimationError where the readings are in another unit, as it seems: the scale, over what the rig states, is
+    within UNIT_SHARE of the ratio of two units. A sensor that has such a scale states it in the rig file."""
+    known = FACTORS["acceleration" if sensor.kind == "accelerometer" else "angular_rate"]
+    for unit, factor in known.items():
+        ratio = known.get(sensor.unit, factor) / factor
+        if ratio != 1.0 and abs(math.log(scale / sensor.scale / ratio)) < UNIT_SHARE:
+            raise EstimationError(
+                f"the readings are in {unit}, it seems, not in {sensor.unit}",
+                place=f"channel {sensor.channel}",
+                found=f"scale {scale:.4g}, {ratio:.4g} is 1 {sensor.unit} in {unit}",
+                expected=f"a scale near {sensor.scale:g}",
+                advice=f"state the unit {unit} in the rig file, or scale = {scale:.3g} where the sensor has that",
+            )
 
 
 def _require_span(sensor: Sensor, inputs: FloatArray, single: bool) -> None:

@@ -32,6 +32,7 @@ def document(comparison: Comparison, recording: Recording) -> dict[str, Any]:
         },
         "rig": {"name": recording.rig.name, "sha256": recording.rig.sha256},
         "reference": comparison.reference,
+        "filter": comparison.filter,
         "filter_class": None if comparison.cfc is None else f"CFC{comparison.cfc:g}",
         "compared": {"samples": len(comparison.time), "rate_hz": plain(comparison.rate)},
         "draws": comparison.draws,

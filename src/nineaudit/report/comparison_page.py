@@ -57,7 +57,7 @@ def _heading(comparison: Comparison, recording: Recording) -> str:
         f"{recording.source.path}: {len(comparison.curves)} schemes, against {comparison.reference} "
         f"({comparison.methods[comparison.reference]}); {verdict} {EXPLAINED:g} times what the rig's uncertainties "
         f"explain ({comparison.draws} draws of the instrument; "
-        f"{'unfiltered' if comparison.cfc is None else f'CFC{comparison.cfc:g}'})"
+        f"{comparison.filter})"
     )
 
 
