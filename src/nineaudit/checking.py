@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -117,17 +117,34 @@ def audit_each(
     dbc: Sequence[Path] = (),
 ) -> Iterator[Outcome]:
     """Audit one recording after the other. One that cannot be audited is an Outcome with its error and does not
-    stop the others; a ConfigurationError does, for it would come again with each of them."""
+    stop the others; a ConfigurationError does, for it would come again with each of them. Waivers that match none
+    of the recordings are findings of the first that is audited."""
     from nineaudit.auditing import audit
     from nineaudit.readers import read
+    from nineaudit.waivers import unmatched
 
-    for path in recordings:
+    paths = list(recordings)
+    lost = unmatched(waivers, paths)
+    for path in paths:
         try:
-            yield Outcome(path, audit=audit(read(path, rig, dbc=dbc), rulebook, waivers=waivers))
+            done = audit(read(path, rig, dbc=dbc), rulebook, waivers=waivers)
+            yield Outcome(path, audit=_with_unmatched(done, lost))
+            lost = ()
         except ConfigurationError:
             raise
         except NineauditError as error:
             yield Outcome(path, error=error)
+
+
+def _with_unmatched(audit: Audit, lost: Sequence[Waiver]) -> Audit:
+    """The audit, judged with the waivers that match no recording of the run; as it is where the rule is left out."""
+    from nineaudit.auditing import judge
+    from nineaudit.waivers import CODE, with_unmatched
+
+    if not lost or CODE not in audit.rulebook:
+        return audit
+    findings = with_unmatched(audit.findings, lost, audit.rulebook[CODE].severity)
+    return replace(audit, findings=findings, verdict=judge(findings))
 
 
 def run(

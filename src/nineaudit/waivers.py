@@ -1,8 +1,9 @@
 """Waivers: a known violation, accepted by someone, for a while, up to a ceiling. It stays visible.
 
 A waiver is for the recordings its glob names. It changes the verdict of findings of its rule (and channels) to
-WAIVED when their value is within its ceiling. One that is expired, or that fits a recording and finds nothing
-to waive there, is itself a finding (WV001): forgotten waivers hide the next fault.
+WAIVED when their value is within its ceiling. One that is expired or not yet in force, that fits a recording and
+finds nothing to waive there, or that fits no recording of a run, is itself a finding (WV001): forgotten waivers
+hide the next fault.
 """
 
 from __future__ import annotations
@@ -50,6 +51,10 @@ class Waiver:
     def fits(self, recording: Path) -> bool:
         """Whether it is for this recording, by file name or whole path."""
         return fnmatchcase(recording.name, self.recordings) or fnmatchcase(recording.as_posix(), self.recordings)
+
+    def holds(self, today: dt.date) -> bool:
+        """Whether it is in force on a day: from that of its approval to its last, both included."""
+        return self.approved_on <= today <= self.expires
 
     def speaks_of(self, finding: Finding) -> bool:
         return self.rule == finding.rule and (
@@ -112,7 +117,7 @@ def apply_waivers(
     findings: Sequence[Finding], waivers: Sequence[Waiver], recording: Path, units: UnitNames, today: dt.date
 ) -> tuple[Finding, ...]:
     """The findings, those that a waiver in force covers with the verdict WAIVED and both reasons."""
-    in_force = [w for w in waivers if w.fits(recording) and today <= w.expires]
+    in_force = [w for w in waivers if w.fits(recording) and w.holds(today)]
     out = []
     for finding in findings:
         waiver = next((w for w in in_force if covers(w, finding, units)), None)
@@ -153,20 +158,39 @@ def judge_waivers(
     if waivers is None:
         return (Finding(CODE, Verdict.NOT_APPLICABLE, severity, "no waiver file was given"),)
     fitting = [w for w in waivers if w.fits(recording)]
-    violation = {Severity.ERROR: Verdict.FAIL, Severity.WARNING: Verdict.WARN}.get(severity, Verdict.PASS)
     bad = [(w, fault) for w in fitting if (fault := _fault(w, findings, units, today))]
     if bad:
-        return tuple(Finding(CODE, violation, severity, f"{w} {fault}", channels=w.channels) for w, fault in bad)
+        return tuple(_violation(w, fault, severity) for w, fault in bad)
     if not fitting:
         return (Finding(CODE, Verdict.NOT_APPLICABLE, severity, "no waiver is for this recording"),)
     reason = f"{len(fitting)} waiver{'s' * (len(fitting) > 1)} for this recording, in force and needed"
     return (Finding(CODE, Verdict.PASS, severity, reason),)
 
 
+def _violation(waiver: Waiver, fault: str, severity: Severity) -> Finding:
+    verdict = {Severity.ERROR: Verdict.FAIL, Severity.WARNING: Verdict.WARN}.get(severity, Verdict.PASS)
+    return Finding(CODE, verdict, severity, f"{waiver} {fault}", channels=waiver.channels)
+
+
+def unmatched(waivers: Sequence[Waiver] | None, recordings: Iterable[Path]) -> tuple[Waiver, ...]:
+    """The waivers that are for none of the recordings of a run."""
+    paths = list(recordings)
+    return tuple(w for w in waivers or () if not any(w.fits(path) for path in paths))
+
+
+def with_unmatched(findings: Sequence[Finding], lost: Sequence[Waiver], severity: Severity) -> tuple[Finding, ...]:
+    """The findings of a recording, and WV001 for each waiver that no recording of the run matched."""
+    fault = "matches no recording of this run"
+    kept = [f for f in findings if f.rule != CODE or f.verdict is not Verdict.NOT_APPLICABLE]
+    return (*kept, *(_violation(waiver, fault, severity) for waiver in lost))
+
+
 def _fault(waiver: Waiver, findings: Sequence[Finding], units: UnitNames, today: dt.date) -> str:
     """What is wrong with a waiver, empty when nothing is."""
     if today > waiver.expires:
         return f"expired on {waiver.expires}"
+    if today < waiver.approved_on:
+        return f"is approved on {waiver.approved_on}, which is yet to come"
     if any(covers(waiver, f, units) for f in findings):
         return ""
     over = [f for f in findings if waiver.speaks_of(f) and f.verdict in WAIVABLE]
