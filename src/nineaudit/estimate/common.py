@@ -28,19 +28,21 @@ from nineaudit.estimate.separation import coarser
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import ROUGH, Fit, fit, log_determinant
 
-COARSE, LOOKS = 400, 4
+COARSE, LOOKS = 250, 3
 """Samples and iterations of the first tries."""
-AS_GOOD, TRIED = 2.0, 2
+AS_GOOD, TRIED = 1.5, 2
 """Cost per degree of freedom, over that without the best channel, up to which a first try is worth another; so many of
 them at most."""
-PART, SPARE = 0.5, 10.0
-"""Part of the best channel's evidence, and nats less, that the linear step of a common cause must promise."""
+PART, SPARE = 0.8, 10.0
+"""Part of the best channel's evidence, and nats less, that a common cause must promise on the coarser record."""
 ROUNDS, SETTLED = 4, 2e-3
 """Steps of what is free in a cause, and the step, in prior standard deviations, that is none."""
 CERTAIN = 10.0
 """Nats by which a factor must be better than the nearest ratio of units to be said."""
-FEWEST, LEFT, WHOLE = 8, 0.03, 1.2
-"""Blocks of rest that tell the noise; part of what is wrong with a record that a true hypothesis may leave, and its cost
+CLEARLY = 1.3
+"""Cost of a record over that of the best channel from which causes far from none are tried: a small fault has none."""
+FEWEST, LEFT, WHOLE = 8, 0.03, 1.3
+"""Blocks of rest that tell the noise; part of what is wrong with a record that a true hypothesis may leave; its cost
 over that of the noise."""
 
 
@@ -90,17 +92,27 @@ def common_causes(healthy: Fit, best: Hypothesis, reference: float) -> list[Comm
     `reference`: log evidence of no fault."""
     at = coarser(healthy, COARSE)
     data = replace(at.data, extra=None)
-    certain = replace(data, prior_sd=np.zeros_like(data.prior_sd))
-    enough = AS_GOOD * _beside(certain, best, at.omega)
-    far = [found for cause in tried(data.array) if (found := _look(certain, cause)).statistic < enough]
-    far.sort(key=lambda x: x.statistic)
     least = PART * best.evidence - SPARE
     close = [(promised(at, cause), cause) for cause in near(data.array)]
     close = [x for x in close if x[0] > least]
+    scale = any(cause.word == "unit" for _, cause in close)
+    far = _far(at, data, best) if scale or healthy.statistic > CLEARLY * best.statistic else []
     likely = [Try(x.cause, fit(x.cause.undo(data), x.required.omega, None, LOOKS)) for x in far[:TRIED]]
     likely += [Try(cause, at) for _, cause in sorted(close, key=lambda x: -x[0])[:TRIED]]
-    whole = [_whole(healthy.data, _freed(data, x), reference) for x in likely]
+    if not likely:
+        return []
+    coarse = h.log_evidence(fit(data, at.omega, at.theta, LOOKS))
+    settled = [x for y in likely if _evidence(x := _freed(data, y)) - coarse > least]
+    whole = [_whole(healthy.data, x, reference) for x in settled]
     return sorted(whole, key=lambda x: -x.found.evidence)
+
+
+def _far(at: Fit, data: Data, best: Hypothesis) -> list[Try]:
+    """Causes that may be far from none, as good as the record without the best channel, the best first."""
+    certain = replace(data, prior_sd=np.zeros_like(data.prior_sd))
+    enough = AS_GOOD * _beside(certain, best, at.omega)
+    far = [found for cause in tried(data.array) if (found := _look(certain, cause)).statistic < enough]
+    return sorted(far, key=lambda x: x.statistic)
 
 
 def _beside(certain: Data, best: Hypothesis, start: FloatArray) -> float:
