@@ -16,6 +16,9 @@ from nineaudit.finding import Severity
 from nineaudit.tables import Key, check_table, nearest, read_toml, schema_of
 
 CODE = re.compile(r"[A-Z]{2,4}[0-9]{3}")
+WAIVER_RULE = "WV001"
+"""The rule that speaks of waivers."""
+LIMITS = "Limits (a changed copy of the sheet, in a folder for `--rules`, sets others):"
 
 _KEYS = {
     "code": Key(str, "two to four capital letters and three digits; the file is named after it"),
@@ -49,6 +52,11 @@ class Rule:
     clause: str = ""
     advice: str = ""
     path: Path | None = None
+
+    @property
+    def packaged(self) -> bool:
+        """Whether it is a rule of nineaudit, not one that `--rules` added or put in its place."""
+        return self.path is not None and self.path.parent == default_directory()
 
 
 @dataclass(frozen=True)
@@ -129,19 +137,48 @@ def parse_sheet(table: Mapping[str, Any], path: Path | None = None) -> Rule:
 
 
 def explain(rule: Rule) -> str:
-    """What a rule means, its equation and limits, and an example either way, as plain text."""
-    limits = [f"  {name} = {json.dumps(value)}" for name, value in rule.limits.items()]
+    """What a newcomer needs, as plain text: why, equation, limits, an example either way, how to mend it, how to
+    accept it for a time, where to read on."""
     parts = [
         f"{rule.code} ({rule.severity}): {rule.title}",
         rule.why,
         f"Computed: {rule.equation}",
         f"Standard: {rule.clause}" if rule.clause else "",
-        "\n".join(["Limits:", *limits]) if limits else "",
+        "\n".join([LIMITS, *limit_lines(rule)]) if rule.limits else "",
         f"Violates: {rule.violates}",
         f"Conforms: {rule.conforms}",
         f"What to do: {rule.advice}" if rule.advice else "",
+        _accepting(rule),
+        f"More: docs/rules/{rule.code}.md" if rule.packaged else "",
     ]
     return "\n\n".join(part for part in parts if part)
+
+
+def limit_lines(rule: Rule) -> list[str]:
+    """The limits of a rule as its sheet has them."""
+    return [f"  {name} = {json.dumps(value)}" for name, value in rule.limits.items()]
+
+
+def waiver_lines(rule: Rule) -> list[str]:
+    """A waiver of a rule for a waiver file, as an example; pasted as it is, it has expired."""
+    return [
+        "[[waiver]]",
+        f'rule = "{rule.code}"',
+        'recordings = "T0001.csv"    # glob of file names or paths',
+        'channels = ["a1y"]          # leave it out for all',
+        "max_value = 1.0             # largest value that is accepted, in the unit of the report; leave it out for any",
+        'reason = "why"',
+        'approved_by = "who"',
+        "approved_on = 2026-01-31",
+        "expires = 2026-02-28        # the last day on which it holds",
+    ]
+
+
+def _accepting(rule: Rule) -> str:
+    if rule.code == WAIVER_RULE:
+        return "To accept a violation: not possible; waivers are not waived."
+    head = "To accept a violation for a time, in a file for `check --waivers` (this example has expired):"
+    return "\n".join([head, *(f"  {line}" for line in waiver_lines(rule))])
 
 
 def rules_schema() -> dict[str, Any]:

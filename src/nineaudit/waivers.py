@@ -17,10 +17,11 @@ from typing import Any
 
 from nineaudit.errors import ConfigurationError
 from nineaudit.finding import Finding, Severity, Verdict
+from nineaudit.rulebook import WAIVER_RULE
 from nineaudit.tables import Key, check_table, nearest, read_toml, schema_of
 from nineaudit.units import UnitNames, display, in_rig_units
 
-CODE = "WV001"
+CODE = WAIVER_RULE
 WAIVABLE = frozenset({Verdict.FAIL, Verdict.WARN, Verdict.INCONCLUSIVE, Verdict.NOT_EVALUATED})
 
 _KEYS = {
