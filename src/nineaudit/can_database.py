@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from nineaudit.dbc_text import Fault, faults
 from nineaudit.errors import ConfigurationError
 from nineaudit.signals import suggestion
 
@@ -38,10 +40,15 @@ class BusSignal:
 
 @dataclass(frozen=True)
 class Databases:
-    """Messages of all databases, and the `bit_rate` (bit/s) of the bus where one states it (attribute Baudrate)."""
+    """Messages of all databases, and the `bit_rate` (bit/s) of the bus where one states it (attribute Baudrate).
+
+    `notes` say which files they are of, and what they hold; `faults` what is missing of which file.
+    """
 
     messages: tuple[Any, ...]
     bit_rate: float | None
+    notes: tuple[str, ...] = ()
+    faults: tuple[tuple[Path, Fault], ...] = ()
 
 
 def load_databases(paths: Sequence[Path]) -> tuple[Any, ...]:
@@ -59,11 +66,12 @@ def read_databases(paths: Sequence[Path]) -> Databases:
             "a CAN log needs a database to decode it, and none is given",
             advice="name it in the rig file ([recording] dbc = [...]) or with --dbc",
         )
-    messages, rates = list[Any](), list[float]()
+    messages, rates, notes, found = list[Any](), list[float](), list[str](), list[tuple[Path, Fault]]()
     for path in paths:
         try:
             # Not strict: databases in use have overlapping signals in messages that do not matter here.
             database = load_file(path, strict=False)
+            content = path.read_bytes()
         except OSError as error:
             raise ConfigurationError(f"cannot read the CAN database: {error.strerror or error}", file=path) from error
         except (Error, ValueError) as error:
@@ -74,7 +82,16 @@ def read_databases(paths: Sequence[Path]) -> Databases:
             ) from error
         messages += getattr(database, "messages", [])
         rates += _bit_rates(database)
-    return Databases(tuple(messages), rates[0] if len(set(rates)) == 1 else None)
+        notes.append(_held(path, content, database))
+        if getattr(database, "dbc", None):
+            found += ((path, fault) for fault in faults(content.decode("cp1252", "replace")))
+    return Databases(tuple(messages), rates[0] if len(set(rates)) == 1 else None, tuple(notes), tuple(found))
+
+
+def _held(path: Path, content: bytes, database: Any) -> str:
+    messages = getattr(database, "messages", [])
+    size = f"{len(messages)} messages, {sum(len(m.signals) for m in messages)} signals"
+    return f"CAN database {path.name}: {size}, SHA-256 {hashlib.sha256(content).hexdigest()}"
 
 
 def _bit_rates(database: Any) -> list[float]:

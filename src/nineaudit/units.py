@@ -63,7 +63,7 @@ class UnitNames(Protocol):
 
 
 _SI_OF: dict[str, Quantity] = {"m/s^2": "acceleration", "rad/s": "angular_rate", "m": "length"}
-_COUNTED = ("samples", "frames", "spikes")
+_COUNTED = ("samples", "frames", "spikes", "messages", "places", "steps")
 _SPELLED = {"g_0": "g", "1": "", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "rad/s^3": "rad/s³"}
 
 

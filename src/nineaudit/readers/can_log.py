@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -12,7 +12,7 @@ import numpy as np
 from nineaudit import can_bits, can_database
 from nineaudit.array import BoolArray, FloatArray, frozen
 from nineaudit.can_bits import bytes_needed
-from nineaudit.can_database import BusSignal
+from nineaudit.can_database import EXTENDED, BusSignal, Databases
 from nineaudit.errors import RecordingError
 from nineaudit.readers.asc import read_asc
 from nineaudit.readers.blf import read_blf
@@ -23,7 +23,7 @@ from nineaudit.readers.can_frames import ERROR, IDENTIFIER, OVERLOAD, REMOTE, Fr
 from nineaudit.readers.candump import read_candump
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.mdf import read_mdf
-from nineaudit.recording import Trace
+from nineaudit.recording import Damage, Trace
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
@@ -82,7 +82,14 @@ def read_can(path: Path, rig: Rig) -> Contents:
         "unavailable_values": float(silent),
     }
     bus = bus_of(log, messages, rows, databases.bit_rate)
-    return Contents(tuple(traces), counts, (*log.notes, *dated, *notes), log.damage, bus)
+    said = (*log.notes, *dated, *notes, *databases.notes)
+    return Contents(tuple(traces), counts, said, (*log.damage, *_cut(databases)), bus)
+
+
+def _cut(databases: Databases) -> Iterator[Damage]:
+    """What is missing of the databases: a finding like what is missing of the log."""
+    for path, fault in databases.faults:
+        yield Damage(fault.what, f"{path.name} line {fault.line}", fault.count, fault.lost)
 
 
 def _counts(log: Frames) -> dict[str, float]:
@@ -105,7 +112,26 @@ def _require_seen(
         f" (0x{signal.message.frame_id:X}) in this log",
         file=path,
         found=f"{frames} frames, most of them {', '.join(shown) or 'error frames'}",
+        advice=_like(signal.key, seen),
     )
+
+
+def _like(key: int, seen: Mapping[int, int]) -> str | None:
+    """What is in the log in place of a message: its number in the other format, or its J1939 parameter group."""
+    if key ^ EXTENDED in seen:
+        bits = 11 if key & EXTENDED else 29
+        return f"frames of that number with {bits} bits are there: the database states {40 - bits}"
+    others = [x for x in sorted(seen) if key & x & EXTENDED and _group(x) == _group(key)]
+    if not others:
+        return None
+    shown = ", ".join(f"0x{x & IDENTIFIER:08X}" for x in others[:5])
+    return f"of the same J1939 parameter group (PGN 0x{_group(key):X}) are there: {shown}; put that into the database"
+
+
+def _group(key: int) -> int:
+    """Parameter group number of a 29-bit identifier: without priority, source address and, below format 240,
+    destination address [SAE J1939-21 5.1.2]."""
+    return key >> 8 & (0x3FFFF if key >> 16 & 0xFF >= 240 else 0x3FF00)
 
 
 def _one_bus(log: Frames, key: int) -> tuple[Rows, list[str]]:
