@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 
-from nineaudit.options import RigFile, Rules, example, group
+from nineaudit.errors import ConfigurationError
+from nineaudit.options import Rules, example, group
+
+T = TypeVar("T")
 
 rules_app = group(help="List, explain and check the rules.", epilog=example("nineaudit rules explain RB301"))
 rig_app = group(
     help="Check a rig file, or start one from a published layout.",
     epilog=example("nineaudit rig presets naap-3222"),
 )
+
+
+def in_turn(paths: Iterable[Path], load: Callable[[Path], T]) -> list[T]:
+    """What each file or folder holds. ConfigurationError: of several that are wrong, one line each."""
+    loaded, wrong = [], []
+    for path in paths:
+        try:
+            loaded.append(load(path))
+        except ConfigurationError as error:
+            wrong.append(error)
+    if len(wrong) > 1:
+        raise ConfigurationError("\n".join(map(str, wrong)))
+    if wrong:
+        raise wrong[0]
+    return loaded
 
 
 @rules_app.command("list", epilog=example("nineaudit rules list"))
@@ -36,13 +55,17 @@ def rules_explain(
 
 @rules_app.command("check", epilog=example("nineaudit rules check my-rules"))
 def rules_check(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of rule sheets.")],
+    places: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of rule sheets, or sheets in them.")],
 ) -> str:
-    """Check the sheets of a folder, and that each fits its check."""
+    """Check the sheets of a folder, and that each fits its check. Of a sheet, the whole folder is checked."""
     from nineaudit import checking
 
-    book = checking.load_book(folder)
-    return f"{folder}: the sheets are in order; {len(book.rules)} rules with those of nineaudit"
+    folders = dict.fromkeys(place.parent if place.suffix == ".toml" else place for place in places)
+    books = in_turn(folders, checking.load_book)
+    return "\n".join(
+        f"{folder}: the sheets are in order; {len(book.rules)} rules with those of nineaudit"
+        for folder, book in zip(folders, books, strict=True)
+    )
 
 
 @rules_app.command("schema", epilog=example("nineaudit rules schema > rule.schema.json"))
@@ -54,12 +77,12 @@ def rules_schema() -> str:
 
 
 @rig_app.command("check", epilog=example("nineaudit rig check rig.toml"))
-def rig_check(rig: RigFile) -> str:
-    """Check a rig file, and show how it was understood."""
+def rig_check(rigs: Annotated[list[Path], typer.Argument(metavar="RIG.toml...", help="The rig files.")]) -> str:
+    """Check rig files, and show how each was understood."""
     from nineaudit import commands
     from nineaudit.rig import load_rig
 
-    return "\n".join(commands.rig_lines(load_rig(rig)))
+    return "\n".join(line for rig in in_turn(rigs, load_rig) for line in commands.rig_lines(rig))
 
 
 @rig_app.command("schema", epilog=example("nineaudit rig schema > rig.schema.json"))
