@@ -14,25 +14,27 @@ from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
 from functools import partial, wraps
 from pathlib import Path
-from typing import Annotated, NoReturn, ParamSpec, TypeVar
+from typing import Annotated, NoReturn, ParamSpec
 
 import typer
 
-from nineaudit import compare_command, motion_command
+from nineaudit import compare_command, motion_command, plain_text, progress, verify_command
 from nineaudit.calibrate import calibrate_app
 from nineaudit.errors import NineauditError
-from nineaudit.options import Dbc, Force, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
+from nineaudit.options import Dbc, Force, Log, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
 from nineaudit.reference import rig_app, rules_app
 
 DEFECT = 70
 """Exit code of an error that is not the user's (EX_SOFTWARE of sysexits.h)."""
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C (128 + SIGINT)."""
+
 FailOn = StrEnum("FailOn", ["error", "warning", "never"])
 Format = StrEnum("Format", ["text", "json", "jsonl", "junit", "github"])
-T = TypeVar("T")
 P = ParamSpec("P")
 
-app = group(pretty_exceptions_enable=False)
+app = group(pretty_exceptions_enable=False, add_completion=True)
 
 
 def _version(wanted: bool) -> None:
@@ -60,6 +62,7 @@ def _root(
 
 @app.command(epilog=example("nineaudit check T0001.csv --rig rig.toml --html T0001.html"))
 def check(
+    context: typer.Context,
     recordings: Recordings,
     rig: RigOption,
     dbc: Dbc = None,
@@ -77,9 +80,10 @@ def check(
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="F", help="Write JUnit XML.")] = None,
     summary: Annotated[Path | None, typer.Option(metavar="F.md", help="Write a summary in Markdown.")] = None,
+    log: Log = None,
 ) -> None:
     """Audit recordings: which rules hold, which channel is at fault, what that does to the results."""
-    from nineaudit import checking
+    from nineaudit import checking, logging_runs
     from nineaudit.parts import recordings as each_recording
     from nineaudit.rig import load_rig
     from nineaudit.waivers import load_waivers
@@ -89,22 +93,25 @@ def check(
     originals = [file for recording in recordings for file in instrument.files(recording)]
     inputs = (*originals, rig, waivers, *(dbc or instrument.dbc))
     recordings = list(each_recording(recordings, instrument.parts))
-    files = checking.files(recordings, inputs, html=html, json=json, junit=junit, summary=summary)
+    logging_runs.protect_log(log, inputs)
+    files = checking.files(recordings, (*inputs, log), html=html, json=json, junit=junit, summary=summary)
     outcomes = checking.audit_each(recordings, instrument, book, accepted, dbc or ())
-    code = checking.run(
-        _progress(outcomes, len(recordings)),
-        files,
-        style=format,
-        fail_on=fail_on,
-        many=len(recordings) > 1,
-        show=partial(typer.echo, nl=False),
-        say=_say,
-    )
+    used = [rig, *([waivers] if waivers else []), *(dbc or instrument.dbc)]
+    noted = logging_runs.Run(log, context.obj or (), used, fail_on) if log else None
+    each: Iterable[checking.Outcome] = noted.watch(outcomes) if noted else outcomes
+    shows: Sequence[progress.Show] = (partial(typer.echo, nl=False), _say)
+    if progress.wanted(len(recordings), sys.stderr.isatty()):
+        each, shows = progress.along(each, len(recordings), shows)
+    many = len(recordings) > 1
+    code = checking.run(each, files, style=format, fail_on=fail_on, many=many, show=shows[0], say=shows[1])
+    if noted:
+        noted.close(files)
     raise typer.Exit(code)
 
 
 @app.command(epilog=example("nineaudit repair T0001.csv --rig rig.toml --output repaired.csv"))
 def repair(
+    context: typer.Context,
     recording: Recording,
     rig: RigOption,
     output: Output,
@@ -113,16 +120,22 @@ def repair(
     by: Annotated[str, typer.Option(metavar="NAME", help="Who, for the provenance.")] = "",
     dbc: Dbc = None,
     force: Force = False,
+    log: Log = None,
 ) -> None:
     """Rebuild the faulty channel into a new file, with its provenance beside it. The original stays as it is."""
-    from nineaudit import commands
+    from nineaudit import commands, logging_runs
     from nineaudit.outputs import protect
     from nineaudit.rig import load_rig
 
     instrument = load_rig(rig)
-    protect([output], [*instrument.files(recording), rig, *(dbc or instrument.dbc)])
+    originals, used = instrument.files(recording), [rig, *(dbc or instrument.dbc)]
+    protect([output], [*originals, *used])
+    logging_runs.protect_log(log, [*originals, *used, output])
     audit = commands.audit_one(recording, instrument, dbc or ())
-    _print(commands.repaired(audit, output, channel=channel, reason=reason, by=by, dbc=dbc or (), force=force))
+    said = commands.repaired(audit, output, channel=channel, reason=reason, by=by, dbc=dbc or (), force=force)
+    if log:
+        logging_runs.log_repair(log, context.obj or (), audit, used, output)
+    _print(said)
 
 
 @app.command(
@@ -231,6 +244,7 @@ def _printing(command: Callable[P, tuple[list[str], int]]) -> Callable[P, None]:
 
 app.command("motion", epilog=motion_command.EXAMPLE)(_printing(motion_command.motion))
 app.command("compare", epilog=compare_command.EXAMPLE)(_printing(compare_command.compare))
+app.command("verify", epilog=verify_command.EXAMPLE)(_printing(verify_command.verify))
 
 for name, reference in (("rules", rules_app), ("rig", rig_app), ("calibrate", calibrate_app)):
     app.add_typer(reference, name=name, result_callback=typer.echo)
@@ -243,9 +257,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     debug = "--debug" in given
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a redirected stream on Windows has not all characters
-            stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="replace")
+            chosen = stream.isatty() or "PYTHONIOENCODING" in os.environ
+            stream.reconfigure(encoding=None if chosen else "utf-8", errors=plain_text.install())
     try:
-        app([argument for argument in given if argument != "--debug"], prog_name="nineaudit")
+        app([argument for argument in given if argument != "--debug"], prog_name="nineaudit", obj=given)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
     except NineauditError as error:
         if debug:
             raise
@@ -267,13 +284,3 @@ def _print(lines: Iterable[str]) -> None:
 
 def _say(text: str) -> None:
     typer.echo(f"nineaudit: {text}", err=True)
-
-
-def _progress(items: Iterable[T], total: int) -> Iterable[T]:
-    """The items, with a bar on the terminal where there are several of them and nothing else is written to it."""
-    if total < 2 or not sys.stderr.isatty() or sys.stdout.isatty():
-        return items
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(items, "recordings", total=total, console=Console(stderr=True), transient=True)

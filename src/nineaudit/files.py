@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 _WINDOWS = os.name == "nt"
 
@@ -16,6 +17,23 @@ def sha256(path: Path) -> str:
     """SHA-256 of a file, as hexadecimal digits. OSError where it cannot be read."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def sealed(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The document with the SHA-256 of its content in the key `seal`: a later change shows (is_sealed)."""
+    return {**document, "seal": _content(document)}
+
+
+def is_sealed(document: Mapping[str, Any]) -> bool:
+    """Whether a document still has the content of its seal."""
+    return document.get("seal") == _content(document)
+
+
+def _content(document: Mapping[str, Any]) -> str:
+    """Of the values, not of the bytes: spaces and the order of keys do not matter."""
+    rest = {key: value for key, value in document.items() if key != "seal"}
+    text = json.dumps(rest, sort_keys=True, ensure_ascii=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def partial_name(path: Path) -> Path:

@@ -34,6 +34,10 @@ Dbc = Annotated[
 Rules = Annotated[
     Path | None, typer.Option("--rules", metavar="DIR", help="Folder of rule sheets to add, or to put in place.")
 ]
+Log = Annotated[
+    Path | None,
+    typer.Option("--log", metavar="F.jsonl", help="Add a line to this log, chained by hashes (see `verify`)."),
+]
 Output = Annotated[Path, typer.Option("--output", metavar="F", help="New file; its suffix is the format.")]
 Channels = Annotated[
     str | None, typer.Option("--channels", metavar="CH,..", help="Only these channels of the rig, as a0x,a0y,a1z.")

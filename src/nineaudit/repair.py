@@ -17,7 +17,7 @@ from nineaudit.array import FloatArray
 from nineaudit.auditing import Audit, mend
 from nineaudit.diagnose import Status
 from nineaudit.errors import ConfigurationError, RecordingError
-from nineaudit.files import partial_name, write_whole
+from nineaudit.files import partial_name, sealed, write_whole
 from nineaudit.provenance import path_beside, to_text
 from nineaudit.readers import fingerprint
 from nineaudit.reconstruct import Reconstruction
@@ -78,7 +78,7 @@ def _record(beside: Path, document: Mapping[str, Any], name: str, file: Path) ->
     """Write the record of a file that is to be called `name`."""
     original = {key: document[key] for key in ("schema", "original")}
     output = {"path": name, "sha256": fingerprint(file)[1]}
-    write_whole(beside, to_text({**original, "output": output, **document}))
+    write_whole(beside, to_text(sealed({**original, "output": output, **document})))
 
 
 @contextmanager

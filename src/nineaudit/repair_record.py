@@ -1,4 +1,4 @@
-"""The record of a repair: what, from what, how, how well, from which rules and rig, by whom, when, with which software."""
+"""The record of a repair: what, from what, how, how well, by which rules and rig, by whom, when, which software."""
 
 from __future__ import annotations
 

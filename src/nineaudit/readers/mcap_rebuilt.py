@@ -14,7 +14,7 @@ import numpy as np
 
 from nineaudit.array import frozen
 from nineaudit.errors import RecordingError
-from nineaudit.provenance import chain
+from nineaudit.provenance import chain, parse
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.mcap_book import Book
 from nineaudit.readers.mcap_json import Json
@@ -40,6 +40,19 @@ def read_repaired(path: Path, rig: Rig) -> Contents:
     traces = tuple(_trace(t, rebuilt, columns, path) for t in found.traces)
     notes = tuple(f"{c}: as repaired, from topic {topic}; its own topic is as measured" for c, topic in rebuilt.items())
     return replace(found, traces=traces, notes=(*found.notes, *notes))
+
+
+def record_in(path: Path) -> Mapping[str, Any] | None:
+    """The record of a repair that stands in an MCAP log; None in other files, and where there is none.
+
+    RecordingError: no MCAP log in spite of its suffix, or no record.
+    """
+    if path.suffix.lower() != ".mcap" or not path.is_file():
+        return None
+    book = Book()
+    for _ in batches(mapped(path), book, lambda _: False):
+        pass
+    return None if book.repair is None else parse(book.repair, path)
 
 
 def _topics(document: Mapping[str, Any]) -> dict[str, str]:

@@ -12,6 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nineaudit.files import sealed
 from nineaudit.finding import COVERAGE_FACTOR, Finding
 from nineaudit.report.bus_document import bus_document
 from nineaudit.report.findings import channels
@@ -36,7 +37,7 @@ def result_schema() -> dict[str, Any]:
 def result_document(audit: Audit) -> dict[str, Any]:
     """The audit as nineaudit/result/1: numbers, strings, lists and null only, keys in a fixed order."""
     rig = audit.recording.rig
-    return {
+    document = {
         "schema": SCHEMA,
         "tool": _tool(audit.tool),
         "recording": _recording(audit.recording),
@@ -49,11 +50,12 @@ def result_document(audit: Audit) -> dict[str, Any]:
         "impact": {name: _impact(impact, rig) for name, impact in audit.impact.items()},
         "bus": bus_document(audit.recording),
     }
+    return sealed(document)
 
 
 def failure_document(path: Path, error: NineauditError, tool: Mapping[str, str]) -> dict[str, Any]:
     """The document of a recording that could not be audited: verdict ``not_audited`` and the reason."""
-    return {
+    document = {
         "schema": SCHEMA,
         "tool": _tool(tool),
         "recording": {"path": path.as_posix(), "format": path.suffix.lower().lstrip(".")},
@@ -61,6 +63,7 @@ def failure_document(path: Path, error: NineauditError, tool: Mapping[str, str])
         "reason": str(error),
         "findings": [],
     }
+    return sealed(document)
 
 
 def to_json(document: Mapping[str, Any]) -> str:
