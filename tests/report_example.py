@@ -6,21 +6,26 @@ Nine channels in general motion, a1y clipped at 55 % of its peak. `example(...)`
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from nineaudit.bus import Bus, Checksum, Counter, Identifier, Load, Outside
 from nineaudit.diagnose import Candidate, Diagnosis, Status
 from nineaudit.engine import sentence
+from nineaudit.estimate.budget import AlphaBudget
+from nineaudit.estimate.calibrated import Calibrated
 from nineaudit.finding import Finding, Measure, Severity, Verdict
 from nineaudit.impact import Impact
-from nineaudit.physics import rigid_body
+from nineaudit.physics import kinematics, rigid_body
 from nineaudit.reconstruct import Reconstruction
-from nineaudit.recording import Clock, Recording, Source, Trace
+from nineaudit.recording import Clock, Damage, Recording, Source, Trace
 from nineaudit.rig import Rig, Units, parse_rig, preset_text
 from nineaudit.units import G0
+from nineaudit.waivers import Waiver
 
 SHA = "3f" * 32
 NOISE = 0.3 * G0
@@ -43,6 +48,15 @@ class Example:
     constraints_u: Any = None
     parity: Any = None
     flagged: Any = None
+    zero: Any = None
+    rest: Any = (-0.02, -0.001)
+    budget: Any = None
+    calibration: Any = None
+    apart: Any = None
+    attitude: Any = None
+    waivers: tuple[Waiver, ...] = ()
+    databases: tuple[tuple[Path, str], ...] = ()
+    command: str = ""
 
 
 def pulses(time: np.ndarray, rows: list[list[tuple[float, float, float]]]) -> np.ndarray:
@@ -65,6 +79,45 @@ def body(n: int) -> SimpleNamespace:
     omega = np.cumsum(alpha * step, axis=0)
     a0 = G0 * pulses(time, [[(92, 0.045, 0.008), (-20, 0.08, 0.02)], [(24, 0.05, 0.01)], [(-38, 0.06, 0.012)]])
     return SimpleNamespace(time=time, omega=omega, alpha=alpha, a0=a0)
+
+
+DAMAGE = Damage("an object that does not begin with LOBJ", "byte 4711", 3, "about 12 frames")
+
+
+def bus(name: str = "KINEMATICS", signal: str = "A0X", unit: str = "g") -> Bus:
+    """Two messages, one of them in the rig and not as its database has it."""
+    wrong = Identifier(
+        0x24, name, "1", True, 2001, -0.02, 0.18, 1e-4, 2e-6, 3e-3, False, cycle=1e-4, length=8, longer=1,
+        counters=(Counter(f"{signal}_CNT", 3, 1),), checksums=(Checksum(f"{signal}_CRC", "sum", 2),),
+        outside=(Outside(signal, 4, -500.0, 500.0, 512.0, unit),), unavailable=((signal, 5),),
+    )  # fmt: skip
+    other = Identifier(0x80000123, None, "1", False, 1, 0.0, 0.0, np.nan, np.nan, np.nan, True)
+    load = Load("1", 0.2, 12_000.0, 15_000.0, 0.01, 900.0, 1_100.0)
+    return Bus((wrong, other), ("STATUS",), 2, 0.011, (load,), 500_000.0, False)
+
+
+def told(k: int) -> tuple[AlphaBudget, Calibrated, np.ndarray]:
+    """A budget, a calibration in which a1y was left out and a0x is far off, and a map with a pair of twins."""
+    rows = {"gain": 52.0, "zero": 21.0, "alignment": 142.0, "position": 34.0, "timing": 3.0, "noise": 59.0,
+            "quantisation": 0.0, "filters": 0.0, "integration": 0.0}  # fmt: skip
+    rng = np.random.default_rng(9)
+    prior = np.tile([0.005, 0.1 * G0, 0.009, 0.009, 5e-4, 5e-4, 5e-4, 1e-5], (k, 1))
+    value, u = prior * rng.standard_normal((k, 8)), 0.7 * prior
+    value[0, 0] = 3.0 * prior[0, 0]
+    value[3], u[3], prior[3] = np.nan, np.nan, np.nan
+    apart = 1.0 + 0.5 * rng.random((k, k))
+    apart[4, 7] = apart[7, 4] = np.inf
+    apart[np.arange(k), np.arange(k)] = np.nan
+    return (
+        AlphaBudget(5260.0, 400, rows, float(np.sqrt(sum(v**2 for v in rows.values())))),
+        Calibrated(value, u, prior),
+        apart,
+    )
+
+
+WAIVER = Waiver(
+    "RQ101", "T*.blf", "known gap of logger 7", "A. Example", date(2026, 1, 2), date(2030, 1, 1), ("a2z",), 0.02
+)
 
 
 def rig(text: str | None = None) -> Rig:
@@ -187,8 +240,9 @@ def example(n: int = 2001, *, path: str = "tests/T0001.blf", rig_text: str | Non
         f"only without {bad} do the constraints hold: 1.08 without, 913 with it (limit 1.31) per degree of freedom",
         {c: (0.4 + 0.05 * i) * G0 for i, c in enumerate(channels)},
         {c: np.inf if i == 6 else (0.9 + 0.1 * i) * G0 for i, c in enumerate(channels)},
-        interval=(float(inside[0]), float(inside[-1])),
+        interval=(float(inside[0]), float(inside[-1])), healthy_statistic=913.0, limit=1.31,
     )  # fmt: skip
+    budget, calibration, apart = told(len(channels))
     return Example(
         made, findings(channels, float(inside[0]), float(inside[-1])), diagnosis, rebuilt,
         {
@@ -198,7 +252,10 @@ def example(n: int = 2001, *, path: str = "tests/T0001.blf", rig_text: str | Non
             "peak a": Impact(94.1, 93.9, 0.8, "g_0"),
         },
         "fail", rulebook(), {"version": "0.1.0", "python": "3.11.9", "numpy": "2.4.6", "scipy": "1.17.1"},
-        motion, constraints, constraints_u, None, {bad: clipped},
+        motion, constraints, constraints_u, None, {bad: clipped}, 0.05 * G0 * np.arange(len(channels)),
+        budget=budget, calibration=calibration, apart=apart,
+        attitude=kinematics.orientation(motion.omega, motion.time), waivers=(WAIVER,),
+        databases=((Path("rigs/head.dbc"), "cd" * 32),), command="nineaudit check tests/T0001.blf --rig rigs/head.toml",
     )  # fmt: skip
 
 
@@ -210,8 +267,15 @@ def healthy(n: int = 401) -> Example:
     passed = tuple(f for f in audit.findings if f.verdict in (Verdict.PASS, Verdict.NOT_APPLICABLE))
     return replace(
         audit, findings=passed, diagnosis=diagnosis, reconstruction=None, impact={}, verdict="pass", motion=None,
-        constraints=None, constraints_u=None, flagged={},
+        constraints=None, constraints_u=None, flagged={}, budget=None, calibration=None, apart=None, attitude=None,
+        rest=None, waivers=(), databases=(), command="",
     )  # fmt: skip
+
+
+def on_a_bus(audit: Example) -> Example:
+    """The same recording from a CAN log that is damaged."""
+    source = replace(audit.recording.source, damage=(DAMAGE,))
+    return replace(audit, recording=replace(audit.recording, bus=bus(), source=source))
 
 
 def ambiguous() -> Example:

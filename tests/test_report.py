@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -16,13 +19,16 @@ from jsonschema import Draft202012Validator
 import nineaudit
 from nineaudit import report
 from nineaudit.diagnose import Diagnosis, Status
+from nineaudit.physics.spectrum import density
+from nineaudit.recording import Damage
 from nineaudit.report.axes import ticks, time_scale
 from nineaudit.report.chart import Band, Chart, Flags, Level, Line
 from nineaudit.report.decimate import columns_of, envelope, runs, strokes
+from nineaudit.report.samples import COMPUTED, RECORDED, packed, packed_time, unpacked
 from nineaudit.report.svg import SCALE, draw
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.simulate import parse_fault, simulate
-from report_example import ambiguous, example, healthy
+from report_example import ambiguous, bus, example, healthy, on_a_bus
 
 HOSTILE = "<script>alert(1)</script>\"'&{{7*7}}"
 
@@ -39,7 +45,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, dict(attrs)))
-        self._hidden = tag == "style"
+        self._hidden = tag in ("style", "script", "template")
 
     def handle_data(self, data: str) -> None:
         if not self._hidden:
@@ -55,7 +61,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def page() -> Page:
-    return Page(report.render(example()))
+    return Page(report.render(on_a_bus(example())))
 
 
 # ---- what the page says ---------------------------------------------------------------------------------------
@@ -103,9 +109,70 @@ def test_a_group_is_not_a_culprit() -> None:
 
 def test_a_pass_says_what_it_means() -> None:
     text = Page(report.render(healthy())).text
+    assert "Uncertainty budget" not in text
+    assert "Every identifier" not in text
+    assert "can tell apart" not in text
     assert "No channel contradicts the others." in text
     assert "A lasting shift of 0.8 g in any channel would have shown." in text
     assert "Motion of the body" not in text
+
+
+def test_budget_names_its_largest_contributors(page: Page) -> None:
+    assert "Most of it is alignment and noise." in page.text
+    assert re.search(r"Source u Share of u² Share as a bar alignment 142.rad/s² 72 %", page.text)
+
+
+def test_map_names_the_channels_that_cannot_be_told_apart(page: Page) -> None:
+    assert "Hardest to tell apart: a1z and a3x (never)." in page.text
+    cells = [td for td in page.every("td") if (td.get("class") or "").startswith("n apart-")]
+    assert len(cells) == 81
+    assert sum(td["class"] == "n apart-3" for td in cells) == 2
+    assert sum(td["class"] == "n apart-none" for td in cells) == 9
+
+
+def test_hypotheses_are_drawn_with_what_they_leave(page: Page) -> None:
+    assert "What each hypothesis leaves unexplained: least 1.08, a1y: clipping; the limit is 1.31." in page.text
+    assert "no channel at fault 913" in page.text
+
+
+def test_calibration_has_zeros_and_what_the_fit_found(page: Page) -> None:
+    rows = page.text[page.text.index("Zero taken off Gain, %") :]
+    assert re.search(r"a0x 0.g \+1.50 ± 0.35 \*", rows)
+    assert re.search(r"a1y 0.15.g – – – – – – – –", rows)
+
+
+def test_bus_damage_waivers_and_origin_are_told(page: Page) -> None:
+    for words in (
+        "0x24 KINEMATICS 1 yes 2001",
+        "A0X_CNT: 3 numbers missing; A0X_CNT: 1 numbers repeated; A0X_CRC: 2 checksums wrong; "
+        "A0X: 4 values outside -500 to 500 g; A0X: 5 times not available; 1 frames longer",
+        "0x00000123 not in the database",
+        "Never came: STATUS.",
+        "T0001.blf byte 4711 an object that does not begin with LOBJ 3 about 12 frames",
+        "RQ101 a2z 0.02 known gap of logger 7 A. Example, 2026-01-02 2030-01-01",
+        f"CAN database rigs/head.dbc SHA-256 of the CAN database {'cd' * 32}",
+        "Command nineaudit check tests/T0001.blf --rig rigs/head.toml",
+        "UB401 not evaluated the normal matrix is singular",
+    ):
+        assert words in page.text, words
+
+
+def test_method_is_ready_to_paste_with_its_references(page: Page) -> None:
+    text = page.text[page.text.index("Method The recording T0001.blf") :]
+    assert example().recording.source.sha256 in text
+    assert "“nine accelerometers" in text
+    assert "a1y was rebuilt at" in text
+    assert "JCGM 106:2012" in text
+    assert "Takhounts E. G." in text
+    assert "compliant" not in page.text.lower()
+
+
+def test_review_says_what_was_reviewed(page: Page) -> None:
+    (form,) = page.every("form")
+    about = json.loads(form["data-about"] or "")
+    assert about["sha256"] == [example().recording.source.sha256]
+    assert about["channels"] == ["a1y"]
+    assert page.text.rstrip().endswith(f"End of report {about['report']}")
 
 
 def test_undiagnosed_gives_its_reason() -> None:
@@ -142,16 +209,26 @@ def test_same_audit_same_bytes() -> None:
     assert report.render(example(501)) == report.render(example(501))
 
 
-def test_nothing_is_fetched_and_nothing_runs(page: Page) -> None:
-    assert not {"script", "link", "img", "iframe", "object", "form", "base"} & {tag for tag, _ in page.tags}
+def test_nothing_is_fetched_and_only_the_packages_script_runs(page: Page) -> None:
+    assert not {"link", "img", "iframe", "object", "base", "embed"} & {tag for tag, _ in page.tags}
+    assert page.every("script") == [{}]
     for tag, attributes in page.tags:
-        assert not [name for name in attributes if name.startswith("on") or name == "style"], tag
+        assert not [name for name in attributes if name.startswith("on") or name in ("style", "action")], tag
         for name in ("src", "href", "xlink:href"):
             assert (attributes.get(name) or "#").startswith("#"), tag
-    policy = next(m["content"] for m in page.every("meta") if m.get("http-equiv") == "Content-Security-Policy")
+
+
+def test_policy_lets_in_just_the_style_and_the_script_of_the_page() -> None:
+    text = report.render(example(201))
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)
     assert policy
-    assert policy.startswith("default-src 'none'; style-src 'sha256-")
-    assert "unsafe" not in policy
+    allowed = dict(part.strip().split(" ", 1) for part in policy[1].replace("&#39;", "'").split(";"))
+    assert allowed.pop("default-src") == allowed.pop("base-uri") == allowed.pop("form-action") == "'none'"
+    for kind, tag in (("script-src", "script"), ("style-src", "style")):
+        (inside,) = re.findall(rf"<{tag}>(.*?)</{tag}>", text, flags=re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(inside.encode()).digest()).decode()
+        assert allowed.pop(kind) == f"'sha256-{digest}'"
+    assert allowed == {}
 
 
 def test_structure_for_people_who_listen(page: Page) -> None:
@@ -166,26 +243,45 @@ def test_structure_for_people_who_listen(page: Page) -> None:
     assert len(ids) == len(set(ids))
     for chart in charts:
         assert set((chart["aria-labelledby"] or "").split()) <= set(ids)
-    assert len(charts) == 9 + 3 + 3 + 3
+    assert len(charts) == 2 * 9 + 3 + 3 + 3 + 1 + 4
     targets = {(a["href"] or "")[1:] for a in page.every("a")}
     assert targets <= set(ids)
 
 
-@pytest.mark.parametrize("where", ["channel", "rig", "path"])
+@pytest.mark.parametrize("where", ["channel", "rig", "path", "bus", "waiver", "command", "damage", "note"])
 def test_hostile_names_are_only_text(where: str) -> None:
+    page = Page(report.render(hostile(where)))
+    assert HOSTILE in page.text
+    assert page.every("script") == [{}]
+    assert "49" not in page.text.replace(HOSTILE, "").split()
+    for plot in page.every("div"):
+        json.loads(plot.get("data-plot") or "{}")
+
+
+@pytest.mark.parametrize("where", ["channel", "rig", "path"])
+def test_hostile_names_do_not_break_machine_outputs(where: str) -> None:
+    audit = hostile(where)
+    report.to_json(report.result_document(audit))
+    report.junit([audit])
+
+
+def hostile(where: str) -> Any:
+    """The example with a name that is a script in one place where a file may put one."""
     text = preset_text("naap-3222")
     toml = HOSTILE.replace('"', '\\"')
     if where == "rig":
         text = re.sub(r'name = "nine[^"]*"', f'name = "{toml}"', text)
     audit = example(201, rig_text=text, path=f"runs/{HOSTILE}.blf" if where == "path" else "runs/T.blf")
-    if where == "channel":
-        audit = _renamed(audit, HOSTILE)
-    page = Page(report.render(audit))
-    assert HOSTILE in page.text
-    assert not page.every("script")
-    assert "49" not in page.text.replace(HOSTILE, "").split()
-    report.to_json(report.result_document(audit))
-    report.junit([audit])
+    source = audit.recording.source
+    changed = {
+        "bus": {"recording": replace(audit.recording, bus=bus(HOSTILE, HOSTILE, HOSTILE))},
+        "waiver": {"waivers": (replace(audit.waivers[0], reason=HOSTILE, approved_by=HOSTILE, channels=(HOSTILE,)),)},
+        "command": {"command": HOSTILE, "databases": ((Path(HOSTILE), "ab" * 32),)},
+        "damage": {"recording": replace(audit.recording, source=replace(source, damage=(Damage(HOSTILE, HOSTILE),)))},
+        "note": {"recording": replace(audit.recording, source=replace(source, notes=(HOSTILE,)))},
+    }
+    audit = replace(audit, **changed.get(where, {}))
+    return _renamed(audit, HOSTILE) if where == "channel" else audit
 
 
 def _renamed(audit: Any, name: str) -> Any:
@@ -244,6 +340,67 @@ def test_a_channel_without_a_valid_sample() -> None:
     text = report.render(replace(audit, recording=replace(audit.recording, readings=readings)))
     assert "no valid sample" in text
     assert "nan" not in text.lower().split()
+
+
+def test_forty_eight_channels_are_small() -> None:
+    sensors = [
+        f'[[sensor]]\nchannel = "c{k}"\nkind = "accelerometer"\nposition = [{5 * k}, {k}, {3 * k}]\n'
+        f"axis = [{k % 2}, 1, 0.5]\n"
+        for k in range(48)
+    ]
+    text = '[rig]\nname = "large"\n[units]\nlength = "mm"\nacceleration = "g_0"\n' + "\n".join(sensors)
+    assert len(report.render(example(20_000, rig_text=text)).encode()) < 12_000_000
+
+
+# ---- samples for the script -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("steps", [COMPUTED, RECORDED])
+def test_samples_come_back_within_half_a_step(steps: int) -> None:
+    _, values = curve(5_000, 8)
+    values[100:200] = np.nan
+    data = packed(values, steps)
+    again = unpacked(data)
+    assert np.array_equal(np.isnan(again), np.isnan(values))
+    assert np.nanmax(np.abs(again - values)) <= 0.5 * data.step * (1 + 1e-9)
+    assert data.step * steps == pytest.approx(np.ptp(values[np.isfinite(values)]), rel=1e-3)
+    assert data == packed(values.copy(), steps)
+
+
+@pytest.mark.parametrize("values", [np.full(7, 3.25), np.full(7, np.nan), np.array([0.0]), np.array([-1e9, 1e-9, 1e9])])
+def test_flat_and_empty_samples(values: np.ndarray) -> None:
+    data = packed(values)
+    assert unpacked(data) == pytest.approx(values, abs=0.5 * data.step, nan_ok=True)
+
+
+def test_time_stamps_come_back_with_their_jitter_and_gaps() -> None:
+    rng = np.random.default_rng(3)
+    time = 1.7e9 + np.cumsum(np.where(np.arange(3_000) == 1_000, 2.0, 1e-3) + 1e-5 * rng.random(3_000))
+    data = packed_time(time)
+    assert np.abs(unpacked(data) - data.middle - (time - time[0])).max() <= 0.5 * data.step * 1.001 + 1e-6
+    assert data.step == pytest.approx(1e-6, rel=0.02)
+
+
+def test_every_plot_over_time_can_be_zoomed_and_says_its_step(page: Page) -> None:
+    plots = [json.loads(div["data-plot"]) for div in page.every("div") if "data-plot" in div]
+    stored = {t["id"] for t in page.every("template")}
+    assert len(plots) == 9 + 3 + 3 + 2
+    for plot in plots:
+        assert {s["key"] for s in (plot["time"], *plot["lines"])} <= stored
+    assert page.text.count("(zoom in steps of") == len(plots)
+    flagged = next(plot for plot in plots if plot["title"] == "a1y as recorded")["flags"]
+    assert sum(last - first + 1 for first, last in flagged) == example().flagged["a1y"].sum()
+
+
+def test_density_of_white_noise_and_of_a_tone() -> None:
+    rng = np.random.default_rng(5)
+    noise = rng.standard_normal(100_000)
+    f, d = density(noise, 10_000.0)
+    assert np.mean(d**2) == pytest.approx(2.0 / 10_000.0, rel=0.02)  # one-sided: variance over half the rate
+    tone = np.sin(2 * np.pi * 500.0 * np.arange(100_000) / 10_000.0)
+    f, d = density(tone, 10_000.0)
+    assert f[np.argmax(d)] == pytest.approx(500.0, abs=10.0)
+    assert np.sum(d**2) * (f[1] - f[0]) == pytest.approx(0.5, rel=0.01)  # Parseval
 
 
 # ---- writing --------------------------------------------------------------------------------------------------

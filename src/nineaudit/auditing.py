@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from enum import StrEnum
 from functools import cached_property
 from importlib.metadata import version
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -19,10 +21,15 @@ from nineaudit.case import Case
 from nineaudit.diagnose import Diagnosis, Status, diagnose
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import closed_form
+from nineaudit.estimate.budget import AlphaBudget
+from nineaudit.estimate.calibrated import Calibrated, calibrated
+from nineaudit.estimate.hypotheses import theta_for
 from nineaudit.estimate.motion import Motion, bridge
+from nineaudit.estimate.separation import apart
+from nineaudit.estimate.trajectory import Fit
 from nineaudit.finding import Finding, Severity, Verdict
 from nineaudit.impact import Impact, impact
-from nineaudit.physics import nap
+from nineaudit.physics import kinematics, nap
 from nineaudit.reconstruct import Reconstruction, rebuild_channel
 from nineaudit.recording import Recording
 from nineaudit.rulebook import Rulebook, load_rulebook
@@ -43,7 +50,9 @@ T = TypeVar("T")
 @dataclass(frozen=True, eq=False)
 class Audit:
     """`findings` of every rule, the `diagnosis`, the `reconstruction` where a channel was rebuilt, its `impact`
-    on what is reported (before and after), the `verdict`, and the versions of what computed it (`tool`)."""
+    on what is reported (before and after), the `verdict`, the versions of what computed it (`tool`), the `waivers` that
+    are for this recording, the CAN `databases` it was decoded by (path, SHA-256), the `command` line if there was one.
+    """
 
     recording: Recording
     case: Case
@@ -54,6 +63,9 @@ class Audit:
     impact: Mapping[str, Impact]
     verdict: AuditVerdict
     tool: Mapping[str, str] = field(default_factory=dict)
+    waivers: tuple[Waiver, ...] = ()
+    databases: tuple[tuple[Path, str], ...] = ()
+    command: str = ""
 
     @cached_property
     def motion(self) -> Motion | None:
@@ -75,6 +87,54 @@ class Audit:
         """Channel -> (n,) samples that their own trace shows to be wrong."""
         flagged = self.case.flagged
         return {c: flagged[:, i] for i, c in enumerate(self.recording.channels) if flagged[:, i].any()}
+
+    @property
+    def zero(self) -> FloatArray:
+        """(k,) SI, what was taken off as the zero of each channel."""
+        return self.case.zero
+
+    @property
+    def rest(self) -> tuple[float, float] | None:
+        """Start and end (s) of the quiet interval over which the zeros were taken; None where there is none."""
+        rest, time = self.case.rest, self.case.time
+        return None if rest is None else (float(time[rest.start]), float(time[rest.stop - 1]))
+
+    @property
+    def budget(self) -> AlphaBudget | None:
+        """Uncertainty of the peak of α by source; None where the array cannot tell it."""
+        return _or(lambda: self.case.alpha_budget, lambda _: None)
+
+    @cached_property
+    def calibration(self) -> Calibrated | None:
+        """The calibration as the fit behind the diagnosis has it; None where no whole record was fitted."""
+        fitted = self._fit
+        return None if fitted is None else _or(lambda: calibrated(fitted), lambda _: None)
+
+    @cached_property
+    def apart(self) -> FloatArray | None:
+        """(k,k) how well each channel's fault is told from each other's (separation.apart), about the fit behind the
+        diagnosis; None where no whole record was fitted."""
+        fitted = self._fit
+        if fitted is None:
+            return None
+        whole = self.case.healthy.data
+        return apart(replace(fitted, data=whole, theta=theta_for(whole, fitted)), self.case.onset)
+
+    @cached_property
+    def attitude(self) -> FloatArray | None:
+        """(n,3,3) body to where it was at the first sample, of `motion`; None where that is not known."""
+        motion = self.motion
+        if motion is None:
+            return None
+        return _or(lambda: kinematics.orientation(motion.omega, self.case.time), lambda _: None)
+
+    @property
+    def _fit(self) -> Fit | None:
+        """The whole-record fit without the culprit, else with all channels, where the diagnosis is by such fits."""
+        if not self.diagnosis.smallest_detectable:
+            return None
+        new = self.reconstruction
+        return self.case.healthy if new is None or new.fit is None else new.fit
 
     @cached_property
     def _constraints(self) -> tuple[FloatArray, FloatArray] | None:
@@ -121,6 +181,8 @@ def audit(
         impact=changes,
         verdict=judge(findings),
         tool=versions(),
+        waivers=tuple(w for w in waivers or () if w.fits(recording.source.path)),
+        databases=_databases(recording),
     )
 
 
@@ -138,6 +200,12 @@ def versions() -> dict[str, str]:
     """Versions of nineaudit, Python, numpy and scipy, for the record."""
     packages = {name: version(name) for name in ("nineaudit", "numpy", "scipy")}
     return {"version": packages.pop("nineaudit"), "python": platform.python_version(), **packages}
+
+
+def _databases(recording: Recording) -> tuple[tuple[Path, str], ...]:
+    """The CAN databases of a recording that came over a bus, with their hashes."""
+    paths = () if recording.bus is None else recording.rig.dbc
+    return tuple((path, hashlib.sha256(path.read_bytes()).hexdigest()) for path in paths if path.is_file())
 
 
 def _words(case: Case) -> dict[str, str]:

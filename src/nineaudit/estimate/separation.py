@@ -78,6 +78,20 @@ def claimed(data: Data, left: Fit, channel: int, rivals: list[int]) -> dict[int,
     return {k: float(_information(masked(data, k), left, fault[None], np.array([channel]))[0]) for k in rivals}
 
 
+def apart(at: Fit, onset: int) -> FloatArray:
+    """(k,k) [i, j] by how much larger a step at the onset in channel i must be to be told from a free waveform in
+    channel j, than to be seen at all: 1 where j cannot imitate it, ∞ where it can wholly, NaN for i = j and for channels
+    without a valid sample."""
+    begin, at = float(at.data.time[onset]), coarser(at, ENOUGH)
+    alone, out = step_sds(at, begin), np.full((len(at.data.array), len(at.data.array)), np.nan)
+    used = np.flatnonzero((at.data.weight > 0).any(axis=0))
+    for j in used.tolist():
+        sds = step_sds(at, begin, free=j)
+        out[used, j] = np.where(np.isfinite(alone[used]), sds[used] / alone[used], np.inf)
+    out[np.arange(len(out)), np.arange(len(out))] = np.nan
+    return out
+
+
 def smallest(at: Fit, onset: int, separation: float) -> tuple[FloatArray, FloatArray]:
     """(k,) size of a step at the onset that would be detected, and that would be told from every other channel's
     free waveform (λ = `separation`), SI; ∞ where no size would do."""

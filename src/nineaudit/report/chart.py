@@ -47,7 +47,9 @@ class Level:
 @dataclass(frozen=True, eq=False)
 class Chart:
     """What to draw over `time` (n,) s; the ground is tinted where `shaded` (n,). `key` makes the element ids unique,
-    `unit` is the y axis'.
+    `unit` is the y axis'. `recorded`: the curves are readings, to be kept as finely as they were taken; `zooms`: the
+    page's script may draw it again, closer. `across`, `up`: other axes than time and value, as (place, word) of each
+    tick, `across_label` what they are.
     """
 
     key: str
@@ -62,3 +64,8 @@ class Chart:
     shaded: BoolArray | None = None
     height: int = 200
     columns: int = 900
+    recorded: bool = False
+    zooms: bool = True
+    across: tuple[tuple[float, str], ...] = ()
+    across_label: str = ""
+    up: tuple[tuple[float, str], ...] = ()

@@ -5,17 +5,17 @@ Signals are in the rig's unit. Every figure says in its description what a reade
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nineaudit.array import BoolArray, FloatArray
+from nineaudit.array import FloatArray
 from nineaudit.finding import COVERAGE_FACTOR
-from nineaudit.report.chart import Band, Chart, Flags, Level, Line
+from nineaudit.report.chart import Band, Chart, Line
 from nineaudit.report.numbers import digits, edge, quantity, sensor_edge, spelled
 from nineaudit.report.svg import draw
+from nineaudit.report.zoom import Zoom
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -31,13 +31,16 @@ MARK_AT_MOST = 0.5
 
 @dataclass(frozen=True)
 class Figure:
-    """`svg` (safe markup), `caption`, and (style, label) of what is drawn."""
+    """`svg` (safe markup), `caption`, and (style, label) of what is drawn. `chart`: what it was drawn from, `zoom`: its
+    samples for the page's script; None where it is no chart over time, or the page has no script."""
 
     svg: str
     caption: str
     legend: tuple[tuple[str, str], ...] = ()
     label: str = ""
     note: str = ""
+    chart: Chart | None = None
+    zoom: Zoom | None = None
 
 
 def figure(chart: Chart, caption: str, label: str = "", note: str = "") -> Figure:
@@ -45,7 +48,7 @@ def figure(chart: Chart, caption: str, label: str = "", note: str = "") -> Figur
     keys = [(line.style, line.label) for line in chart.lines]
     keys += [(band.style, band.label) for band in chart.bands]
     keys += [("flag", flags.label) for flags in chart.flags if flags.mask.any()]
-    return Figure(draw(chart), caption, tuple(k for k in keys if k[1]), label, note)
+    return Figure(draw(chart), caption, tuple(k for k in keys if k[1]), label, note, chart)
 
 
 def reconstruction_figures(audit: Audit) -> list[Figure]:
@@ -101,6 +104,7 @@ def _closer(chart: Chart, interval: tuple[float, float]) -> Chart | None:
     return replace(
         chart,
         key=f"closer-{chart.key}",
+        zooms=False,
         title=f"{chart.title}, the replaced interval closer",
         time=chart.time[inside],
         shaded=None if chart.shaded is None else chart.shaded[inside],
@@ -161,52 +165,7 @@ def motion_figures(audit: Audit) -> list[Figure]:
     return figures
 
 
-def gallery(audit: Audit, marked: Sequence[str]) -> list[Figure]:
-    """Every channel as recorded, with its range and its flagged samples; `marked` channels are the diagnosis'."""
-    return [_channel(audit, k, marked) for k in range(len(audit.recording.channels))]
-
-
-def _channel(audit: Audit, k: int, marked: Sequence[str]) -> Figure:
-    recording = audit.recording
-    sensor = recording.rig.array.sensors[k]
-    unit, one = sensor_edge(sensor, recording.rig)
-    values = recording.readings[:, k] / one
-    mask = _flagged(audit, sensor.channel)
-    missing = int(np.sum(~np.isfinite(values)))
-    facts = [f"{sensor.kind}, {_reach(values, unit)}"]
-    facts += [f"range ±{quantity(sensor.full_scale / one, unit)}"] if sensor.full_scale else []
-    facts += [f"{int(mask.sum())} samples flagged"] if mask.any() else []
-    facts += [f"{missing} samples invalid or missing"] if missing else []
-    limits = () if sensor.full_scale is None else (sensor.full_scale / one, -sensor.full_scale / one)
-    chart = Chart(
-        key=f"channel-{k}",
-        title=f"{sensor.channel} as recorded",
-        description="; ".join(facts) + ".",
-        time=recording.time,
-        unit=spelled(unit),
-        lines=(Line(values, "measured", ""),),
-        flags=(Flags(values, mask, "flagged sample"),),
-        levels=tuple(Level(v, "range") for v in limits),
-        height=130,
-        columns=600,
-    )
-    note = "named by the diagnosis" if sensor.channel in marked else ""
-    return figure(chart, "; ".join(facts), sensor.channel, note)
-
-
-def _flagged(audit: Audit, channel: str) -> BoolArray:
-    mask = audit.flagged.get(channel)
-    return np.zeros(len(audit.recording.time), dtype=np.bool_) if mask is None else np.asarray(mask, dtype=np.bool_)
-
-
 def _peak(values: FloatArray, unit: str) -> str:
     """The value of the largest magnitude with its sign."""
     finite = values[np.isfinite(values)]
     return quantity(float(finite[np.argmax(np.abs(finite))]), unit) if finite.size else "no valid sample"
-
-
-def _reach(values: FloatArray, unit: str) -> str:
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return "no valid sample"
-    return f"{digits(float(finite.min()))} to {quantity(float(finite.max()), unit)}"

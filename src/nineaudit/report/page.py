@@ -1,4 +1,7 @@
-"""Audit -> the HTML report: one file, offline, complete without script, the same bytes for the same audit."""
+"""Audit -> the HTML report: one file, offline, complete without script, the same bytes for the same audit.
+
+The script of the page (zoom, reviewer's form) and the style sheet are let in by their hashes, and nothing else is.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.finding import Verdict
-from nineaudit.report import origin, tables
-from nineaudit.report.figures import (
-    Figure,
-    constraint_figures,
-    gallery,
-    motion_figures,
-    reconstruction_figures,
-)
+from nineaudit.report import annex, hypotheses, method, origin, review, tables
+from nineaudit.report.channels import gallery
+from nineaudit.report.figures import Figure, constraint_figures, motion_figures, reconstruction_figures
 from nineaudit.report.findings import NOTABLE, WEIGHT, by_rule, channels
 from nineaudit.report.numbers import (
     digits,
@@ -32,6 +30,8 @@ from nineaudit.report.numbers import (
     spelled,
 )
 from nineaudit.report.text import diagnosis_sentence, fault_word, joined
+from nineaudit.report.view import views
+from nineaudit.report.zoom import store, zoomable
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -104,38 +104,88 @@ def _drawn(figure: Figure) -> Any:
     return Markup(figure.svg)
 
 
+SCRIPTS = ("vendor/uplot/uPlot.iife.min.js", "templates/zoom.js", "templates/review.js")
+
+
 def style(more: str = "") -> dict[str, Any]:
     """The style sheet, with `more` rules after it, and the policy that allows it and nothing else."""
     from markupsafe import Markup
 
-    css = files("nineaudit.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    sheet = "\n" + css + more
-    digest = base64.b64encode(hashlib.sha256(sheet.encode("utf-8")).digest()).decode("ascii")
-    return {
-        "css": Markup(sheet),
-        "csp": f"default-src 'none'; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'",
-    }
+    sheet = "\n" + _packaged("templates/report.css") + more
+    return {"css": Markup(sheet), "csp": _policy(f"style-src {_digest(sheet)}")}
+
+
+def script() -> dict[str, Any]:
+    """The style sheet and the script of a page that can zoom and be reviewed, and the policy that allows just these."""
+    from markupsafe import Markup
+
+    code = "\n" + "\n".join(_packaged(name) for name in SCRIPTS)
+    styled = style("\n" + _packaged("vendor/uplot/uPlot.min.css") + "\n")
+    policy = _policy(f"script-src {_digest(code)}; style-src {_digest(styled['css'])}")
+    return styled | {"script": Markup(code), "csp": policy}
+
+
+@cache
+def _packaged(name: str) -> str:
+    return files("nineaudit.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _digest(text: str) -> str:
+    digest = base64.b64encode(hashlib.sha256(str(text).encode("utf-8")).digest()).decode("ascii")
+    return f"'sha256-{digest}'"
+
+
+def _policy(allowed: str) -> str:
+    return f"default-src 'none'; {allowed}; base-uri 'none'; form-action 'none'"
 
 
 def context(audit: Audit) -> dict[str, Any]:
     """Everything that the template shows, as finished strings, lists of them, and figures."""
-    return style() | {
-        "marks": {str(verdict): mark for verdict, mark in MARKS.items()},
-        "name": audit.recording.source.path.name,
-        "banner": banner(audit),
+    drawn = {
+        "constraints": zoomable(constraint_figures(audit)),
+        "motion": zoomable(motion_figures(audit)),
+        "gallery": zoomable(gallery(audit, audit.diagnosis.channels)),
+    }
+    new = rebuilt(audit)
+    shown = [*(new["figures"] if new else ()), *(f for figures in drawn.values() for f in figures)]
+    return (
+        script()
+        | drawn
+        | _tables(audit)
+        | {
+            "marks": {str(verdict): mark for verdict, mark in MARKS.items()},
+            "name": audit.recording.source.path.name,
+            "banner": banner(audit),
+            "diagnosis": audit.diagnosis,
+            "residuals": hypotheses.residuals(audit),
+            "ambiguity": hypotheses.ambiguity(audit),
+            "rebuilt": new,
+            "tally": tally(audit),
+            "views": views(audit),
+            "rig": rig(audit),
+            "store": store(shown),
+            "review": review.form(audit),
+        }
+    )
+
+
+def _tables(audit: Audit) -> dict[str, Any]:
+    return {
         "identity": origin.identity(audit),
-        "diagnosis": audit.diagnosis,
         "candidates": tables.candidates(audit),
         "sensitivity": tables.sensitivity(audit),
         "impact": tables.impact(audit),
-        "rebuilt": rebuilt(audit),
         "families": tables.rule_families(audit),
-        "tally": tally(audit),
-        "constraints": constraint_figures(audit),
-        "motion": motion_figures(audit),
-        "gallery": gallery(audit, audit.diagnosis.channels),
-        "rig": rig(audit),
-        "provenance": origin.provenance(audit),
+        "budget": annex.budget(audit),
+        "waivers": annex.waivers(audit),
+        "deviations": annex.deviations(audit),
+        "calibration": annex.calibration(audit),
+        "rest": annex.rest(audit),
+        "bus": annex.bus(audit),
+        "damage": annex.damage(audit),
+        "provenance": [*origin.provenance(audit), *annex.origin(audit)],
+        "method": method.paragraphs(audit),
+        "references": method.references(audit),
     }
 
 
@@ -146,6 +196,7 @@ def banner(audit: Audit) -> dict[str, Any]:
     rival = others[0] if others else None
     return {
         "verdict": verdict,
+        "number": origin.number(audit),
         "label": verdict.replace("_", " "),
         "lead": LEAD[verdict],
         "power": tables.power(audit) if str(diagnosis.status) == "healthy" else "",
@@ -201,7 +252,7 @@ def rebuilt(audit: Audit) -> dict[str, Any] | None:
     ]
     if math.isfinite(new.bound_ratio):
         facts.append(("Its white-noise part against the Cramér–Rao bound", f"{digits(new.bound_ratio)} times"))
-    return {"facts": facts, "figures": reconstruction_figures(audit)}
+    return {"facts": facts, "figures": zoomable(reconstruction_figures(audit))}
 
 
 def rig(audit: Audit) -> dict[str, Any]:

@@ -104,27 +104,44 @@ def _levels(frame: _Frame) -> list[Level]:
 
 def _axes(frame: _Frame) -> list[str]:
     chart, bottom = frame.chart, frame.chart.height
-    origin, one, label = time_scale(chart.time)
-    edges = [(t - origin) / one for t in frame.span]
     parts = []
-    for value in ticks(frame.low, frame.high, chart.height // 26):
+    for value, word in _up(frame):
         top = frame.top(value)
-        parts.append(f'<line class="{"zero" if value == 0 else "grid"}" x2="100%" y1="{top}" y2="{top}"/>')
-        parts.append(f'<text class="tick" x="-8" y="{top}" dy=".35em" text-anchor="end">{digits(value, 6)}</text>')
-    for value in ticks(edges[0], edges[1], 6):
-        left = frame.left(value * one + origin)
+        parts.append(f'<line class="{"zero" if word == "0" else "grid"}" x2="100%" y1="{top}" y2="{top}"/>')
+        parts.append(f'<text class="tick" x="-8" y="{top}" dy=".35em" text-anchor="end">{word}</text>')
+    label, across = _across(frame)
+    for value, word in across:
+        left = frame.left(value)
         parts.append(f'<line class="grid" x1="{left}" x2="{left}" y2="{bottom}"/>')
-        anchor = "end" if value > edges[1] - 0.03 * (edges[1] - edges[0]) else "middle"
+        anchor = "end" if value > frame.span[1] - 0.03 * (frame.span[1] - frame.span[0]) else "middle"
         place = f'x="{left}" y="{bottom + 15}" text-anchor="{anchor}"'
-        parts.append(f'<text class="tick" {place}>{digits(value, 6)}</text>')
+        parts.append(f'<text class="tick" {place}>{word}</text>')
     parts.append(f'<text class="unit" x="-8" y="-9" text-anchor="end">{_text(chart.unit)}</text>')
     parts.append(f'<text class="unit" x="100%" y="{bottom + 30}" text-anchor="end">{_text(label)}</text>')
     return parts
 
 
+def _up(frame: _Frame) -> list[tuple[float, str]]:
+    """(value, word) of the ticks of the y axis."""
+    if frame.chart.up:
+        return [(v, _text(word)) for v, word in frame.chart.up if frame.low <= v <= frame.high]
+    return [(v, digits(v, 6)) for v in ticks(frame.low, frame.high, frame.chart.height // 26)]
+
+
+def _across(frame: _Frame) -> tuple[str, list[tuple[float, str]]]:
+    """Label of the x axis, and (value, word) of its ticks."""
+    chart, (start, end) = frame.chart, frame.span
+    if chart.across:
+        return chart.across_label, [(v, _text(word)) for v, word in chart.across if start <= v <= end]
+    origin, one, label = time_scale(chart.time)
+    found = ticks((start - origin) / one, (end - origin) / one, 6)
+    return label, [(v * one + origin, digits(v, 6)) for v in found]
+
+
 def _line(frame: _Frame, line: Line) -> str:
     x, y = frame.x(frame.chart.time), frame.y(np.where(np.isfinite(line.values), line.values, 0.0))
-    pieces = [_stroke(x[i], y[i]) for i in strokes(frame.chart.time, line.values, frame.column)]
+    clock = np.arange(len(x), dtype=float) if frame.chart.across else frame.chart.time
+    pieces = [_stroke(x[i], y[i]) for i in strokes(clock, line.values, frame.column)]
     return f'<path class="line {line.style}" d="{"".join(pieces)}"/>' if pieces else ""
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 CANDIDATES_SHOWN = 9
-_ABOUT = (("Why", "why"), ("Computed", "equation"), ("Standard", "clause"), ("What to do", "advice"))
+_ABOUT = (("Why", "why"), ("Computed", "equation"), ("What to do", "advice"))
 _NUMBERS_SAY = frozenset({Verdict.PASS, Verdict.WARN, Verdict.FAIL, Verdict.INCONCLUSIVE})
 
 
@@ -48,6 +48,7 @@ def _rule(group: Group, sheet: Any, rig: Rig) -> Row:
     return {
         "code": group.rule,
         "title": sheet.title if sheet else "",
+        "clause": getattr(sheet, "clause", ""),
         "severity": str(group.worst.severity),
         "about": [(name, getattr(sheet, key)) for name, key in _ABOUT if getattr(sheet, key, "")],
         "worst": finding_row(group.worst, rig),

@@ -1,0 +1,46 @@
+"""The reviewer's form: what is filled in after the audit, on screen or on paper. Its export names what was reviewed."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from nineaudit.report.origin import number
+
+if TYPE_CHECKING:
+    from nineaudit.auditing import Audit
+
+DECISIONS = (
+    ("", "not decided"),
+    ("accepted", "accepted as recorded"),
+    ("accepted with repair", "accepted with the rebuilt channel"),
+    ("accepted with deviation", "accepted with the deviation described below"),
+    ("rejected", "rejected"),
+)
+FIELDS = (
+    ("test", "Test number", "text"),
+    ("item", "Test item and its serial number", "text"),
+    ("tested_on", "Date of the test", "date"),
+    ("laboratory", "Laboratory", "text"),
+    ("reviewer", "Reviewer", "text"),
+    ("reviewed_on", "Date of the review", "date"),
+)
+SIGNATURES = ("Test engineer", "Reviewer")
+
+
+def form(audit: Audit) -> dict[str, Any]:
+    """Fields, decisions and signature lines, and as JSON what the review is about."""
+    source = audit.recording.source
+    about = {
+        "report": number(audit),
+        "recording": source.path.name,
+        "sha256": [file.sha256 for file in source.files],
+        "verdict": str(audit.verdict),
+        "channels": list(audit.diagnosis.channels),
+    }
+    return {
+        "about": json.dumps(about, ensure_ascii=False, separators=(",", ":")),
+        "fields": FIELDS,
+        "decisions": DECISIONS,
+        "signatures": SIGNATURES,
+    }
