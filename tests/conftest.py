@@ -6,7 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
+settings.register_profile("shared machine", deadline=None)  # a test is as slow as what runs beside it
+settings.load_profile("shared machine")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: as on the command line
 
 

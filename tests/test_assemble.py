@@ -193,6 +193,30 @@ def test_other_times_are_kept_as_recorded() -> None:
     assert found.source.notes == ()
 
 
+def test_channels_of_one_clock_share_their_stamps_and_no_reading_is_copied_twice() -> None:
+    """Memory of a recording is that of the traces, of one array of stamps, of the readings and of which are valid."""
+    import tracemalloc
+
+    n = 100_000
+    time, values = np.arange(n) / 1e4, np.sin(np.arange(n))
+    traces = tuple(Trace(c, c, frozen(time), frozen(values), None) for c in "pqw")
+    tracemalloc.start()
+    found = assemble(Contents(traces), RIG, Source(Path("x.csv"), "csv", "", 0))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found.native[0].time is found.native[1].time is found.native[2].time is found.time
+    assert peak < n * (8 * (3 + 1 + 3 + 4.5) + 3)  # some arrays more for the analysis of the clock
+    assert not any(a.flags.writeable for t in found.native for a in (t.time, t.values))
+    assert not any(a.flags.writeable for a in (found.readings, found.valid))
+
+
+def test_a_number_that_no_unit_can_hold_is_no_reading() -> None:
+    huge = np.where(np.arange(200) == 7, 1.7e308, 1.0)
+    found = assembled((GRID, huge), same(), same())
+    assert np.flatnonzero(~found.valid[:, 0]).tolist() == [7]
+    assert np.isnan(found.native[0].values[7])
+
+
 # --- units --------------------------------------------------------------------------------------------------------
 
 

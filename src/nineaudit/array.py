@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,18 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
+_Array = TypeVar("_Array", bound=NDArray[Any])
+
 Kind = Literal["accelerometer", "gyroscope"]
 
 
 def frozen(values: object) -> FloatArray:
     """A read-only float64 copy, so that a value that holds it cannot change."""
-    array = np.array(values, dtype=np.float64)
+    return read_only(np.array(values, dtype=np.float64))
+
+
+def read_only(array: _Array) -> _Array:
+    """The array itself, which nobody writes to any more: for one that was made here and is held by nobody else."""
     array.setflags(write=False)
     return array
 

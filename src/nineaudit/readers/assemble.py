@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from nineaudit.array import BoolArray, FloatArray, frozen
+from nineaudit.array import BoolArray, FloatArray, read_only
 from nineaudit.errors import RecordingError
 from nineaudit.readers import alignment
 from nineaudit.readers.clock import clock_of, in_order
@@ -40,23 +40,20 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     by_channel = {trace.channel: trace for trace in contents.traces}
     traces = [by_channel[sensor.channel] for sensor in rig.array.sensors]
     origin, notes = _origin(traces)
-    traces = [_in_si(trace, rig, origin) for trace in traces]
-    usable = [in_order(trace.time) for trace in traces]
-    clocks = tuple(clock_of(trace.time, used) for trace, used in zip(traces, usable, strict=True))
-    native = tuple(_only(trace, used) for trace, used in zip(traces, usable, strict=True))
+    native, clocks = _on_their_clocks([_in_si(trace, rig) for trace in traces], origin)
     shared = _shared(native, source) if u_parts else (-np.inf, np.inf)
     base = max(range(len(native)), key=lambda i: _inside(native[i].time, shared).size)
     time = _inside(native[base].time, shared)
     _require_samples(time, source)
     cut = _cut(native[base], time)
     columns, alignments = _on_one_base(time, native, clocks, base, source, u_parts or {})
-    readings = frozen(np.column_stack(columns))
+    readings = read_only(np.column_stack(columns))
     said = alignment.notes(alignments, native[base].channel, clocks[base].rate, _si_units(rig))
     stated = _stated_units(contents.traces, rig)
     return Recording(
         time=time,
         readings=readings,
-        valid=_read_only(np.isfinite(readings)),
+        valid=read_only(np.isfinite(readings)),
         rig=alignment.with_timing(rig, alignments),
         source=replace(source, notes=(*source.notes, *notes, *cut, *said, *stated)),
         native=native,
@@ -77,7 +74,7 @@ def _shared(native: Sequence[Trace], source: Source) -> tuple[float, float]:
 
 def _inside(time: FloatArray, span: tuple[float, float]) -> FloatArray:
     kept = (time >= span[0]) & (time <= span[1])
-    return time if kept.all() else frozen(time[kept])
+    return time if kept.all() else read_only(time[kept])
 
 
 def _cut(base: Trace, time: FloatArray) -> tuple[str, ...]:
@@ -103,9 +100,10 @@ def _on_one_base(
     alignments: dict[int, Alignment] = {}
     for members in _messages(native):
         first, clock = native[members[0]], clocks[members[0]]
-        if np.array_equal(first.time, native[base].time):
+        if _equal(first.time, native[base].time):
+            start = int(np.searchsorted(first.time, time[0]))
             for i in members:
-                columns[i] = native[i].values[np.searchsorted(first.time, time)]
+                columns[i] = native[i].values[start : start + time.size]
             continue
         _require_overlap(time, first, source)
         together = np.column_stack([native[i].values for i in members])
@@ -127,8 +125,11 @@ def _messages(native: Sequence[Trace]) -> list[list[int]]:
 
 
 def _same_samples(one: Trace, other: Trace) -> bool:
-    same = np.array_equal(one.time, other.time)
-    return same and np.array_equal(np.isfinite(one.values), np.isfinite(other.values))
+    return _equal(one.time, other.time) and np.array_equal(np.isfinite(one.values), np.isfinite(other.values))
+
+
+def _equal(one: FloatArray, other: FloatArray) -> bool:
+    return one is other or np.array_equal(one, other)
 
 
 def _si_units(rig: Rig) -> dict[str, str]:
@@ -144,17 +145,32 @@ def _origin(traces: Sequence[Trace]) -> tuple[float, tuple[str, ...]]:
     return first, (f"time stamps are dates; they are counted from the first, {first!r} s",)
 
 
-def _in_si(trace: Trace, rig: Rig, origin: float) -> Trace:
+def _in_si(trace: Trace, rig: Rig) -> Trace:
+    """Values in SI, calibrated; NaN where there is no finite number."""
     sensor = rig.array[trace.channel]
-    factor = si_factor(sensor, trace.unit)
-    values = np.where(np.isfinite(trace.values), trace.values * factor - sensor.offset, np.nan)
-    return replace(trace, time=frozen(trace.time - origin), values=frozen(values))
+    with np.errstate(over="ignore"):
+        values = trace.values * si_factor(sensor, trace.unit)
+        values -= sensor.offset
+    values[~np.isfinite(values)] = np.nan
+    return replace(trace, values=read_only(values))
 
 
-def _only(trace: Trace, used: BoolArray) -> Trace:
-    if used.all():
-        return trace
-    return replace(trace, time=frozen(trace.time[used]), values=frozen(trace.values[used]))
+def _on_their_clocks(traces: Sequence[Trace], origin: float) -> tuple[tuple[Trace, ...], tuple[Clock, ...]]:
+    """The samples that are used, counted from `origin`, and what each clock did. Traces of one clock share their array
+    of stamps, and its analysis."""
+    found = list[tuple[FloatArray, FloatArray, BoolArray, Clock]]()
+    native, clocks = list[Trace](), list[Clock]()
+    for trace in traces:
+        known = next((x for x in found if _equal(x[0], trace.time)), None)
+        if known is None:
+            time = read_only(trace.time - origin)
+            used = in_order(time)
+            known = trace.time, time if used.all() else read_only(time[used]), used, clock_of(time, used)
+            found.append(known)
+        _, time, used, clock = known
+        native.append(replace(trace, time=time, values=trace.values if used.all() else read_only(trace.values[used])))
+        clocks.append(clock)
+    return tuple(native), tuple(clocks)
 
 
 def _require_samples(time: FloatArray, source: Source) -> None:
@@ -187,8 +203,3 @@ def _stated_units(traces: Sequence[Trace], rig: Rig) -> tuple[str, ...]:
         if t.unit and t.unit.strip() != rig.array[t.channel].unit
     ]
     return (f"units as the recording states them: {', '.join(other)}",) if other else ()
-
-
-def _read_only(mask: BoolArray) -> BoolArray:
-    mask.setflags(write=False)
-    return mask

@@ -6,6 +6,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nineaudit.bus import Bus, Identifier, Load
 from nineaudit.can_bits import ByteMatrix
@@ -17,6 +18,7 @@ from nineaudit.readers.clock import deviation
 WINDOW: Final = 0.1
 """Seconds of the window in which the busiest load is looked for."""
 _CYCLE: Final = 1e-3
+_STANDARD: Final = 1 << 11
 
 
 def bus_of(log: Frames, messages: Sequence[Any], used: Container[int], bit_rate: float | None = None) -> Bus:
@@ -31,12 +33,23 @@ def bus_of(log: Frames, messages: Sequence[Any], used: Container[int], bit_rate:
 
 def _groups(log: Frames) -> Iterator[Rows]:
     """Rows of the data frames of each identifier on each bus, in the order of the log."""
-    rows = np.flatnonzero(log.is_data)
-    label = (log.key[rows].astype(np.uint64) << np.uint64(16)) | log.bus[rows]
-    order = np.argsort(label, kind="stable")
-    ends = np.flatnonzero(np.diff(label[order])) + 1
-    if len(rows):
-        yield from np.split(rows[order], ends)
+    for bus in np.unique(log.bus).tolist():
+        rows = np.flatnonzero(log.is_data & (log.bus == bus))
+        label = _numbered(log.key[rows])
+        order = np.argsort(label, kind="stable")  # by radix, of 16 bits
+        ends = np.flatnonzero(np.diff(label[order])) + 1
+        if len(rows):
+            yield from np.split(rows[order], ends)
+
+
+def _numbered(key: NDArray[np.uint32]) -> NDArray[Any]:
+    """(n,) numbers in place of keys, in the same order, as small as they can be."""
+    standard = key < _STANDARD
+    extended, place = np.unique(key[~standard], return_inverse=True)
+    out = np.empty(len(key), dtype=np.uint16 if len(extended) + _STANDARD < 1 << 16 else np.uint32)
+    out[standard] = key[standard]
+    out[~standard] = place + _STANDARD
+    return out
 
 
 def _identifier(log: Frames, rows: Rows, known: Mapping[int, Any], used: Container[int]) -> Identifier:
@@ -96,14 +109,16 @@ def _loads(log: Frames) -> Iterator[Load]:
     29-bit identifier; stuff bits at most ⌊(33 + 8n)/4⌋ and ⌊(53 + 8n)/4⌋ [Davis et al., Real-Time Systems 35 (2007)
     239, eq 1]. Data frames and remote frames; FD frames by the same count, which is not theirs."""
     extended = (log.key & np.uint32(EXTENDED)) != 0
-    carried = np.where(log.is_data, 8 * log.length.astype(np.int64), 0)
-    least = np.where(extended, 67, 47) + carried
-    most = least + (np.where(extended, 53, 33) + carried) // 4
+    carried = np.where(log.is_data, log.length, 0).astype(np.int32) << 3
+    least = np.where(extended, np.int32(67), np.int32(47)) + carried
+    most = least + ((np.where(extended, np.int32(53), np.int32(33)) + carried) >> 2)
     sent = (log.kind & (ERROR | OVERLOAD)) == 0
     for bus in np.unique(log.bus[sent]).tolist():
         rows = np.flatnonzero(sent & (log.bus == bus))
         since = log.time[rows] - log.time[rows].min()
-        windows = np.unique(since // int(WINDOW * 1e9), return_inverse=True)[1]  # a log may stand still for a year
+        windows = since // int(WINDOW * 1e9)
+        if windows.max() > 4 * len(rows):  # a log may stand still for a year
+            windows = np.unique(windows, return_inverse=True)[1]
         low, high = (np.bincount(windows, weights=bits[rows]) for bits in (least, most))
         yield Load(
             bus=log.buses[bus],

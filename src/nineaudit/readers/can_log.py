@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from nineaudit import can_bits, can_database
-from nineaudit.array import BoolArray, FloatArray, frozen
+from nineaudit.array import BoolArray, FloatArray, read_only
 from nineaudit.can_bits import bytes_needed
 from nineaudit.can_database import EXTENDED, BusSignal, Databases
 from nineaudit.errors import RecordingError
@@ -70,7 +70,7 @@ def read_can(path: Path, rig: Rig) -> Contents:
         bad[signal.key] = max(bad.get(signal.key, (0, 0)), (lost.short, lost.undecodable))
         silent += lost.unavailable
         time = (log.time[chosen[carried]] - base) / 1e9
-        traces.append(Trace(sensor.channel, signal.name, frozen(time), frozen(values), signal.signal.unit))
+        traces.append(Trace(sensor.channel, signal.name, read_only(time), read_only(values), signal.signal.unit))
     known = {BusSignal(m, None).key for m in messages}
     counts = {
         **_counts(log),
