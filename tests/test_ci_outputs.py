@@ -127,11 +127,11 @@ def test_the_ten_worst_are_those_of_the_greatest_weight() -> None:
     assert all(line.startswith("::warning file=w") for line in lines[1:])
 
 
-@pytest.mark.parametrize("size", [10, 10_000, 3_000_000])
+@pytest.mark.parametrize("size", [10, 10_000, 300_000])
 @pytest.mark.parametrize("mark", ["|", "x", "\U0001f600", "\n"])
 def test_a_summary_is_below_one_mebibyte_whatever_the_input(size: int, mark: str) -> None:
     audits = [
-        with_findings(found(Verdict.FAIL, said=mark * size), path=f"{mark * min(size, 9000)}{i}.csv") for i in range(40)
+        with_findings(found(Verdict.FAIL, said=mark * size), path=f"{mark * min(size, 9000)}{i}.csv") for i in range(12)
     ]
     text = report.markdown(audits, {Path(f"{i}{mark}.blf"): mark * min(size, 20_000) for i in range(800)})
     assert len(text.encode()) < SUMMARY_BYTES
