@@ -72,7 +72,7 @@ def parse(text: str | bytes, place: Path | str) -> dict[str, Any]:
     """A record. RecordingError where it is none: then nobody knows which channels were measured."""
     try:
         document = json.loads(text)
-        wrong = next(filter(None, (_wrong(one) for one in chain(document))), None)
+        wrong = next(filter(None, (_wrong(one) for one in chain(document))), None if document else "it is empty")
     except (ValueError, AttributeError, RecursionError) as error:
         wrong, document = str(error), {}
     if wrong is None:
