@@ -52,7 +52,7 @@ def decode(signal: Any, payload: ByteMatrix) -> FloatArray:
 def raw(signal: Any, payload: ByteMatrix) -> NDArray[Any]:
     """(n,) raw values: uint64, int64, or the floating-point numbers themselves."""
     parts = [part for _, part in _blocks(signal, payload)]
-    return np.concatenate(parts) if parts else np.empty(0, dtype=np.uint64)
+    return np.concatenate(parts) if parts else np.empty(0, dtype=np.int64 if signal.is_signed else np.uint64)
 
 
 def carried(signal: Any, message: Any, payload: ByteMatrix) -> BoolArray:

@@ -78,6 +78,11 @@ def in_rig_units(value: float, unit: str, names: UnitNames) -> tuple[float, str]
     return value / FACTORS[quantity][name], name
 
 
+def counted(count: int, noun: str) -> str:
+    """``1 gap``, ``2 gaps``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def display(value: float, unit: str, names: UnitNames, significant: int = 3) -> str:
     """``12.4 g``: a value in an SI (or any other) `unit` with its unit, as the rig speaks."""
     number, name = in_rig_units(value, unit, names)

@@ -8,6 +8,7 @@ from nineaudit.bus import Identifier
 from nineaudit.case import Case
 from nineaudit.checks.bus import NO_BUS, Answer
 from nineaudit.finding import Measure, NotApplicable
+from nineaudit.units import counted
 
 _FEW = 3
 """Frames without which nothing is said of a message that stands still."""
@@ -162,8 +163,8 @@ def _total(
         return found
     worst, total = max(found, key=count), sum(map(count, found))
     others = sum(count(x) > 0 for x in found) - 1
-    more = f", and {others} more messages" if others > 0 else ""
-    detail = f"{worst.label}: {told(worst)}{more}; in all" if total else f"{len(found)} messages,"
+    more = f", and {counted(others, 'more message')}" if others > 0 else ""
+    detail = f"{worst.label}: {told(worst)}{more}; in all" if total else f"{counted(len(found), 'message')},"
     return Measure(float(total), float(limit), unit, detail=detail)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from nineaudit.case import Case
 from nineaudit.finding import Measure, NotApplicable
 from nineaudit.recording import Clock
+from nineaudit.units import counted
 
 
 def completeness(case: Case, *, max_missing: float) -> Sequence[Measure]:
@@ -39,7 +40,7 @@ def gaps(case: Case, *, max_in_a_row: int) -> Sequence[Measure]:
             unit="samples",
             channels=channels,
             interval=_longest(clock),
-            detail=f"{len(clock.gaps)} gaps, about {clock.lost} samples lost, the longest gap"
+            detail=f"{counted(len(clock.gaps), 'gap')}, about {counted(clock.lost, 'sample')} lost, the longest gap"
             if clock.gaps
             else "no gap, the longest",
         )

@@ -194,9 +194,12 @@ MODEL_SLACK = 0.15
 
 
 def limit_per_dof(dof: int, false_alarm: float = 1e-3) -> float:
-    """Largest cost per degree of freedom of a hypothesis that holds: χ² by its normal limit, plus MODEL_SLACK."""
+    """Largest cost per degree of freedom of a hypothesis that holds: χ² by its normal limit, plus MODEL_SLACK; NaN
+    where nothing is left to test it by."""
     from statistics import NormalDist
 
+    if dof < 1:
+        return float("nan")
     return 1.0 + MODEL_SLACK - NormalDist().inv_cdf(false_alarm) * float(np.sqrt(2.0 / dof))
 
 

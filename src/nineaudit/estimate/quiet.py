@@ -65,6 +65,8 @@ def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray, anywher
     if readings.shape[0] < 2 * length:
         return None
     alive = np.isfinite(readings).mean(axis=0) > 0.5
+    if not alive.any():
+        return None
     overall = np.nanstd(readings[:, alive], axis=0)
     allowed = np.where(np.isfinite(noise[alive]), 3.0 * noise[alive], 0.02 * overall)
     allowed = np.where(allowed > 0, allowed, np.inf)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LEAST_SAMPLES: Final = 8
 """Fewer samples than this are no recording."""
+LARGEST: Final = 1e75
+"""m/s² or rad/s beyond which a number is no reading: its fourth power could not be held."""
 EPOCH_S: Final = 1e6
 """Later first stamps (11 days) are dates: as floating-point seconds they keep only parts of a microsecond."""
 
@@ -146,12 +148,12 @@ def _origin(traces: Sequence[Trace]) -> tuple[float, tuple[str, ...]]:
 
 
 def _in_si(trace: Trace, rig: Rig) -> Trace:
-    """Values in SI, calibrated; NaN where there is no finite number."""
+    """Values in SI, calibrated; NaN where there is no number that can be a reading."""
     sensor = rig.array[trace.channel]
     with np.errstate(over="ignore"):
         values = trace.values * si_factor(sensor, trace.unit)
         values -= sensor.offset
-    values[~np.isfinite(values)] = np.nan
+    values[~(np.abs(values) < LARGEST)] = np.nan
     return replace(trace, values=read_only(values))
 
 
@@ -186,6 +188,8 @@ def _require_samples(time: FloatArray, source: Source) -> None:
 def _require_overlap(time: FloatArray, trace: Trace, source: Source) -> None:
     if trace.time.size < 2 or trace.time[0] > time[-1] or trace.time[-1] < time[0]:
         found = f"{trace.time[0]:.6g} s to {trace.time[-1]:.6g} s" if trace.time.size else "no samples"
+        if trace.time.size == 1:
+            found = f"a single sample, at {trace.time[0]:.6g} s"
         raise RecordingError(
             "no time in common with the other channels",
             file=source.path,

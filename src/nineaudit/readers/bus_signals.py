@@ -117,10 +117,15 @@ _METHODS: Final[dict[str, Callable[[ByteMatrix, int, int], Any]]] = {
 
 def unavailable(signal: Any, payload: ByteMatrix) -> BoolArray:
     """(n,) true where a signal says, by a number that its database names so, that it has no value."""
-    codes = [int(number) for number, name in (signal.choices or {}).items() if _UNAVAILABLE.search(str(name))]
-    if not codes or signal.is_float:
+    if not signal.choices or signal.is_float:
         return np.zeros(len(payload), dtype=np.bool_)
-    return np.asarray(np.isin(can_bits.raw(signal, payload).astype(np.int64), codes))
+    low, high = can_bits.raw_limits(signal)
+    named = (int(number) for number, name in signal.choices.items() if _UNAVAILABLE.search(str(name)))
+    codes = [number for number in named if low <= number <= high]
+    if not codes:
+        return np.zeros(len(payload), dtype=np.bool_)
+    numbers = can_bits.raw(signal, payload)
+    return np.asarray(np.isin(numbers, np.array(codes, dtype=numbers.dtype)))
 
 
 def outside(message: Any, payload: ByteMatrix) -> Iterator[Outside]:

@@ -53,7 +53,8 @@ def read_can(path: Path, rig: Rig) -> Contents:
     found = [can_database.find_signal(messages, sensor.signal) for sensor in rig.array.sensors]
     log = FRAME_READERS[path.suffix.lower()](path)
     if not len(log):
-        raise RecordingError("no CAN frames in this log", file=path, found="; ".join(map(str, log.damage)) or None)
+        why = f": {'; '.join(map(str, log.damage))}" if log.damage else ""
+        raise RecordingError(f"no CAN frames in this log{why}", file=path)
     seen = key_counts(log)
     rows, notes, left_out = {}, list[str](), 0
     for sensor, signal in zip(rig.array.sensors, found, strict=True):
@@ -69,6 +70,8 @@ def read_can(path: Path, rig: Rig) -> Contents:
         values, carried, lost = _decode(signal, log, chosen)
         bad[signal.key] = max(bad.get(signal.key, (0, 0)), (lost.short, lost.undecodable))
         silent += lost.unavailable
+        if not carried.any():
+            raise _never_carried(signal, sensor.channel, len(chosen), path)
         time = (log.time[chosen[carried]] - base) / 1e9
         traces.append(Trace(sensor.channel, signal.name, read_only(time), read_only(values), signal.signal.unit))
     known = {BusSignal(m, None).key for m in messages}
@@ -113,6 +116,16 @@ def _require_seen(
         file=path,
         found=f"{frames} frames, most of them {', '.join(shown) or 'error frames'}",
         advice=_like(signal.key, seen),
+    )
+
+
+def _never_carried(signal: BusSignal, channel: str, frames: int, path: Path) -> RecordingError:
+    numbers = ", ".join(map(str, signal.signal.multiplexer_ids or ()))
+    return RecordingError(
+        f"missing channel {channel!r}: no frame of message {signal.message.name} carries {signal.signal.name}",
+        file=path,
+        found=f"{frames} frames of the message",
+        expected=f"frames in which {signal.signal.multiplexer_signal} is {numbers}",
     )
 
 

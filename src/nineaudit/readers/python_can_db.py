@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import sqlite3
 from pathlib import Path
+from typing import Final
 
 from nineaudit.errors import RecordingError
 from nineaudit.readers.python_can_rows import Rows, put
 from nineaudit.readers.text_log import NOT_READ, Account
+
+_MOST_S: Final = 4.6e9
+"""Seconds from 1970 (to 2115, or before) of which all differences are int64 ns."""
 
 
 def read_database(path: Path, rows: Rows, account: Account) -> tuple[str, ...]:
@@ -38,7 +42,7 @@ def read_database(path: Path, rows: Rows, account: Account) -> tuple[str, ...]:
                 is_error_frame=bool(row[4]),
                 dlc=row[5],
             )
-            time = round(stamp * 1e9) if abs(stamp) < 9e9 else None
+            time = round(stamp * 1e9) if abs(stamp) < _MOST_S else None
             put(message, time, data, rows, account, number, repr(row))
     except (sqlite3.Error, OverflowError) as error:
         account.damaged(
