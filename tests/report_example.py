@@ -55,7 +55,6 @@ class Example:
     apart: Any = None
     attitude: Any = None
     waivers: tuple[Waiver, ...] = ()
-    databases: tuple[tuple[Path, str], ...] = ()
     command: str = ""
 
 
@@ -255,7 +254,7 @@ def example(n: int = 2001, *, path: str = "tests/T0001.blf", rig_text: str | Non
         motion, constraints, constraints_u, None, {bad: clipped}, 0.05 * G0 * np.arange(len(channels)),
         budget=budget, calibration=calibration, apart=apart,
         attitude=kinematics.orientation(motion.omega, motion.time), waivers=(WAIVER,),
-        databases=((Path("rigs/head.dbc"), "cd" * 32),), command="nineaudit check tests/T0001.blf --rig rigs/head.toml",
+        command="nineaudit check tests/T0001.blf --rig rigs/head.toml",
     )  # fmt: skip
 
 
@@ -268,7 +267,7 @@ def healthy(n: int = 401) -> Example:
     return replace(
         audit, findings=passed, diagnosis=diagnosis, reconstruction=None, impact={}, verdict="pass", motion=None,
         constraints=None, constraints_u=None, flagged={}, budget=None, calibration=None, apart=None, attitude=None,
-        rest=None, waivers=(), databases=(), command="",
+        rest=None, waivers=(), command="",
     )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,7 +9,6 @@ from datetime import date
 from enum import StrEnum
 from functools import cached_property
 from importlib.metadata import version
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -51,8 +49,7 @@ T = TypeVar("T")
 class Audit:
     """`findings` of every rule, the `diagnosis`, the `reconstruction` where a channel was rebuilt, its `impact`
     on what is reported (before and after), the `verdict`, the versions of what computed it (`tool`), the `waivers` that
-    are for this recording, the CAN `databases` it was decoded by (path, SHA-256), the `command` line if there was one.
-    """
+    are for this recording, and the `command` line if there was one."""
 
     recording: Recording
     case: Case
@@ -64,7 +61,6 @@ class Audit:
     verdict: AuditVerdict
     tool: Mapping[str, str] = field(default_factory=dict)
     waivers: tuple[Waiver, ...] = ()
-    databases: tuple[tuple[Path, str], ...] = ()
     command: str = ""
 
     @cached_property
@@ -182,7 +178,6 @@ def audit(
         verdict=judge(findings),
         tool=versions(),
         waivers=tuple(w for w in waivers or () if w.fits(recording.source.path)),
-        databases=_databases(recording),
     )
 
 
@@ -200,12 +195,6 @@ def versions() -> dict[str, str]:
     """Versions of nineaudit, Python, numpy and scipy, for the record."""
     packages = {name: version(name) for name in ("nineaudit", "numpy", "scipy")}
     return {"version": packages.pop("nineaudit"), "python": platform.python_version(), **packages}
-
-
-def _databases(recording: Recording) -> tuple[tuple[Path, str], ...]:
-    """The CAN databases of a recording that came over a bus, with their hashes."""
-    paths = () if recording.bus is None else recording.rig.dbc
-    return tuple((path, hashlib.sha256(path.read_bytes()).hexdigest()) for path in paths if path.is_file())
 
 
 def _words(case: Case) -> dict[str, str]:

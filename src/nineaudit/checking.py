@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -115,10 +116,11 @@ def audit_each(
     rulebook: Rulebook,
     waivers: Sequence[Waiver] | None = None,
     dbc: Sequence[Path] = (),
+    command: Sequence[str] = (),
 ) -> Iterator[Outcome]:
     """Audit one recording after the other. One that cannot be audited is an Outcome with its error and does not
     stop the others; a ConfigurationError does, for it would come again with each of them. Waivers that match none
-    of the recordings are findings of the first that is audited."""
+    of the recordings are findings of the first that is audited. `command`: the arguments of the run, for the report."""
     from nineaudit.auditing import audit
     from nineaudit.readers import read
     from nineaudit.waivers import unmatched
@@ -128,6 +130,7 @@ def audit_each(
     for path in paths:
         try:
             done = audit(read(path, rig, dbc=dbc), rulebook, waivers=waivers)
+            done = replace(done, command=shlex.join(["nineaudit", *command]) if command else "")
             yield Outcome(path, audit=_with_unmatched(done, lost))
             lost = ()
         except ConfigurationError:

@@ -95,7 +95,7 @@ def check(
     recordings = list(each_recording(recordings, instrument.parts))
     logging_runs.protect_log(log, inputs)
     files = checking.files(recordings, (*inputs, log), html=html, json=json, junit=junit, summary=summary)
-    outcomes = checking.audit_each(recordings, instrument, book, accepted, dbc or ())
+    outcomes = checking.audit_each(recordings, instrument, book, accepted, dbc or (), context.obj or ())
     used = [rig, *([waivers] if waivers else []), *(dbc or instrument.dbc)]
     noted = logging_runs.Run(log, context.obj or (), used, fail_on) if log else None
     each: Iterable[checking.Outcome] = noted.watch(outcomes) if noted else outcomes

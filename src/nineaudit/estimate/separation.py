@@ -80,14 +80,14 @@ def claimed(data: Data, left: Fit, channel: int, rivals: list[int]) -> dict[int,
 
 def apart(at: Fit, onset: int) -> FloatArray:
     """(k,k) [i, j] by how much larger a step at the onset in channel i must be to be told from a free waveform in
-    channel j, than to be seen at all: 1 where j cannot imitate it, ∞ where it can wholly, NaN for i = j and for channels
-    without a valid sample."""
+    channel j, than to be seen at all: 1 where j cannot imitate it, ∞ where it can wholly, NaN for i = j and for
+    channels without a valid sample."""
     begin, at = float(at.data.time[onset]), coarser(at, ENOUGH)
     alone, out = step_sds(at, begin), np.full((len(at.data.array), len(at.data.array)), np.nan)
     used = np.flatnonzero((at.data.weight > 0).any(axis=0))
     for j in used.tolist():
         sds = step_sds(at, begin, free=j)
-        out[used, j] = np.where(np.isfinite(alone[used]), sds[used] / alone[used], np.inf)
+        out[used, j] = np.where(np.isfinite(alone[used]), np.maximum(sds[used] / alone[used], 1.0), np.inf)
     out[np.arange(len(out)), np.arange(len(out))] = np.nan
     return out
 

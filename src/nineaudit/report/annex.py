@@ -123,7 +123,7 @@ def deviations(audit: Audit) -> list[tuple[str, str]]:
         rows.append(("file", "the recording changed while it was read"))
     if recording.resampled:
         rows.append(("time base", f"interpolated onto the common time base: {', '.join(recording.resampled)}"))
-    return rows + [("reader", note) for file in source.files for note in file.notes]
+    return rows
 
 
 def _said(finding: Finding) -> str:
@@ -185,8 +185,10 @@ def _milliseconds(value: float | None) -> str:
 
 def _load(x: Load, rate: float | None) -> Row:
     def part(bits: float, duration: float) -> str:
-        if rate is None or duration <= 0:
+        if duration <= 0:
             return f"{digits(bits)} bit"
+        if rate is None:
+            return quantity(1e-3 * bits / duration, "kbit/s", 4)
         return f"{digits(100.0 * bits / (rate * duration), 2)} %"
 
     return {
@@ -195,11 +197,3 @@ def _load(x: Load, rate: float | None) -> Row:
         "peak": f"{part(x.peak_least, x.window)} to {part(x.peak_most, x.window)}",
         "window": quantity(x.window, spelled("s")),
     }
-
-
-def origin(audit: Audit) -> list[tuple[str, str, bool]]:
-    """(name, value, whether it is a hash or path): CAN databases and the command line."""
-    rows = []
-    for path, digest in audit.databases:
-        rows += [("CAN database", path.as_posix(), True), ("SHA-256 of the CAN database", digest, True)]
-    return rows + ([("Command", audit.command, True)] if audit.command else [])

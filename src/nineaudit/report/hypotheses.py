@@ -47,16 +47,16 @@ def _bars(rows: list[tuple[str, float, str]], limit: float | None, span: tuple[f
         '<title id="bars-t">Cost per degree of freedom of each hypothesis</title>',
         f'<desc id="bars-d">{_text(told)}.</desc>',
     ]
-    for k, (name, value, style) in enumerate(rows):
-        y, end = ROW * k, _place(value, span)
-        parts.append(f'<text class="tick" x="{LEFT - 1:g}%" y="{y + 16}" text-anchor="end">{_text(name)}</text>')
-        parts.append(f'<rect class="cost {style}" x="{LEFT:g}%" y="{y + 5}" width="{end - LEFT:.2f}%" height="14"/>')
-        parts.append(f'<text class="tick" x="{end:.2f}%" dx="5" y="{y + 16}">{digits(value, full=True)}</text>')
     for value, name in [(1.0, "1"), *([(limit, f"limit {digits(limit)}")] if limit else [])]:
         x, style = _place(value, span), "zero" if name == "1" else "level"
         parts.append(f'<line class="{style}" x1="{x:.2f}%" x2="{x:.2f}%" y2="{height}"/>')
         if name != "1":
             parts.append(f'<text class="tick" x="{x:.2f}%" y="{height + 16}" text-anchor="middle">{name}</text>')
+    for k, (name, value, style) in enumerate(rows):
+        y, end = ROW * k, _place(value, span)
+        parts.append(f'<text class="tick" x="{LEFT - 1:g}%" y="{y + 16}" text-anchor="end">{_text(name)}</text>')
+        parts.append(f'<rect class="cost {style}" x="{LEFT:g}%" y="{y + 5}" width="{end - LEFT:.2f}%" height="14"/>')
+        parts.append(f'<text class="tick" x="{end:.2f}%" dx="5" y="{y + 16}">{digits(value, full=True)}</text>')
     return "".join([*parts, "</svg>"])
 
 

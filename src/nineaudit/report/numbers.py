@@ -103,7 +103,8 @@ def printable(text: object) -> str:
     """Names and paths come from files: a line break is a space, and what cannot be printed (control characters,
     terminal escapes, bidirectional overrides) is shown as U+FFFD.
     """
-    return "".join(map(_shown, str(text)))
+    words = str(text)
+    return words if words.isprintable() else "".join(map(_shown, words))
 
 
 def _shown(character: str) -> str:

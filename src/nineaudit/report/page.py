@@ -183,7 +183,7 @@ def _tables(audit: Audit) -> dict[str, Any]:
         "rest": annex.rest(audit),
         "bus": annex.bus(audit),
         "damage": annex.damage(audit),
-        "provenance": [*origin.provenance(audit), *annex.origin(audit)],
+        "provenance": origin.provenance(audit) + ([("Command", audit.command, True)] if audit.command else []),
         "method": method.paragraphs(audit),
         "references": method.references(audit),
     }
