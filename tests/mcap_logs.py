@@ -117,3 +117,61 @@ def batch_of(messages: list[bytes], *, before: bytes = b"\xa5\x5a\x01") -> Batch
     ends = np.cumsum(sizes + len(before))
     count = np.arange(len(messages), dtype=np.int64)
     return Batch(Channel(1, 1, "/t", ""), data, ends - sizes, ends, count, count, 0)
+
+
+Messages = dict[str, dict[str, list[float]]]
+"""Of each message inside the message its fields, and of each field a value a message."""
+
+
+def in_encoding(path: Path, encoding: str, times: list[float], messages: Messages) -> None:
+    """Messages of `time_s` and of messages of numbers: "ros1", "ros2" (fields in order, without gaps), "protobuf"."""
+    schema, wire = _described(encoding, messages)
+    columns = [times, *(values for fields in messages.values() for values in fields.values())]
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=20_000)
+        writer.start()
+        number = writer.register_schema("test.Array" if encoding == "protobuf" else "test/msg/Array", *schema)
+        channel = writer.register_channel("/array", wire, number)
+        for i, row in enumerate(zip(*columns, strict=True)):
+            writer.add_message(channel, log_time=i * 100_000, publish_time=0, data=_packed(encoding, row, messages))
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _described(encoding: str, messages: Messages) -> tuple[tuple[str, bytes], str]:
+    """(encoding, text) of the schema, and the encoding of messages."""
+    if encoding == "protobuf":
+        return ("protobuf", _descriptors(messages).SerializeToString()), "protobuf"
+    text = "float64 time_s\n" + "".join(f"test/{name.replace('_', '')} {name}\n" for name in messages)
+    for name, fields in messages.items():
+        text += "=" * 80 + f"\nMSG: test/{name.replace('_', '')}\n" + "".join(f"float64 {f}\n" for f in fields)
+    return (("ros1msg", text.encode()), "ros1") if encoding == "ros1" else (("ros2msg", text.encode()), "cdr")
+
+
+def _descriptors(messages: Messages) -> Any:
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+
+    found = FileDescriptorSet()
+    file = found.file.add(name="array.proto", package="test", syntax="proto3")
+    whole = file.message_type.add(name="Array")
+    whole.field.add(name="time_s", number=1, type=1, label=1)
+    for k, (name, fields) in enumerate(messages.items()):
+        whole.field.add(name=name, number=k + 2, type=11, label=1, type_name=f".test.{name}")
+        inner = file.message_type.add(name=name)
+        for j, field in enumerate(fields):
+            inner.field.add(name=field, number=j + 1, type=1, label=1)
+    return found
+
+
+def _packed(encoding: str, row: tuple[float, ...], messages: Messages) -> bytes:
+    if encoding != "protobuf":
+        return (b"\0\1\0\0" if encoding == "ros2" else b"") + struct.pack(f"<{len(row)}d", *row)
+    values = iter(row)
+    out = _double(1, next(values))
+    for k, fields in enumerate(messages.values()):
+        inner = b"".join(_double(j + 1, next(values)) for j in range(len(fields)))
+        out += bytes([k + 2 << 3 | 2, len(inner)]) + inner
+    return out
+
+
+def _double(number: int, value: float) -> bytes:
+    return bytes([number << 3 | 1]) + struct.pack("<d", value)

@@ -6,6 +6,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from mcap_logs import Messages, in_encoding
 from nineaudit.recording import Recording
 from nineaudit.rig import Rig, parse_rig
 from nineaudit.simulate import simulate
@@ -20,6 +21,7 @@ SENSORS = {
     "wx": ("gyroscope", (0, 0, 0), (1, 0, 0), "NAAP_B.WX"),
 }
 CAN_FORMATS = (".blf", ".asc", ".log", ".trc", ".can.csv", ".mf4", ".db")
+MCAP_FORMATS = (".ros2.mcap", ".ros1.mcap", ".protobuf.mcap")
 TABLE_FORMATS = (".csv", ".tsv", ".txt", ".parquet", ".mcap", ".mme", ".zip")
 
 
@@ -55,6 +57,8 @@ def write_any(recording: Recording, folder: Path, suffix: str) -> Path:
     path = folder / f"recording{suffix}"
     if suffix in (".log", ".trc", ".can.csv", ".mf4", ".db"):
         return _by_python_can(recording, folder, path, suffix)
+    if suffix in MCAP_FORMATS:
+        return by_mcap(recording, path, suffix.split(".")[1])
     write_recording(recording, path, dbc=database(recording.rig, folder))
     return path
 
@@ -73,4 +77,15 @@ def _by_python_can(recording: Recording, folder: Path, path: Path, suffix: str) 
             out.on_message_received(frame)
         while suffix == ".db" and not out.buffer.empty():  # what waits when it is stopped, python-can loses
             time.sleep(0.01)
+    return path
+
+
+def by_mcap(recording: Recording, path: Path, encoding: str) -> Path:
+    """Through the mcap library, as a message of messages: the rig's signals are their fields."""
+    sensors = recording.rig.array.sensors
+    messages: Messages = {}
+    for k, sensor in enumerate(sensors):
+        name, _, field = sensor.signal.partition(".")
+        messages.setdefault(name, {})[field] = (recording.readings[:, k] / sensor.to_si).tolist()
+    in_encoding(path, encoding, recording.time.tolist(), messages)
     return path

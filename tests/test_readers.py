@@ -20,7 +20,7 @@ from nineaudit.errors import ConfigurationError, NineauditError, RecordingError
 from nineaudit.readers import READERS, read
 from nineaudit.recording import Recording
 from nineaudit.rig import Rig, parse_rig
-from recordings import CAN_FORMATS, TABLE_FORMATS, array_rig, motion, write_any
+from recordings import CAN_FORMATS, MCAP_FORMATS, TABLE_FORMATS, array_rig, motion, write_any
 
 RIG = array_rig()
 MOTION = motion(RIG)
@@ -48,7 +48,7 @@ def test_every_suffix_has_the_same_tests() -> None:
     assert tested | {".mme", ".zip"} == set(READERS)  # tests/test_mme.py
 
 
-@pytest.mark.parametrize("suffix", CAN_FORMATS + TABLE_FORMATS)
+@pytest.mark.parametrize("suffix", CAN_FORMATS + TABLE_FORMATS + MCAP_FORMATS)
 def test_the_same_motion_in_every_format(tmp_path: Path, suffix: str) -> None:
     path = write_any(MOTION, tmp_path, suffix)
     found = read(path, RIG, dbc=[tmp_path / "rig.dbc"] if suffix in CAN_FORMATS else [])

@@ -104,7 +104,7 @@ class Columns:
     def frames(self, **rest: Any) -> Frames:
         """All of them, once; `rest` are the fields of the whole log."""
         self._note_channels()
-        columns = {name: column.array() for name, column in self._columns.items()}
+        columns: dict[str, Any] = {name: column.array() for name, column in self._columns.items()}
         long_rows, long = self._long or self._columns_of_long(0)
         present = np.flatnonzero(self._present)
         codes = (np.cumsum(self._present) - 1).astype(np.uint16)

@@ -119,7 +119,7 @@ def _windows(file: BinaryIO, at: int) -> Iterator[Window]:
 
 def _linked(data: bytes, last: bool) -> tuple[list[Item], int, bool] | None:
     """Items of a window by following their sizes; None where that does not lead from one to the next."""
-    items, at = [], 0
+    items, at = list[Item](), 0
     while True:
         begin = data.find(b"LOBJ", at, at + 4 + PADDING)
         if begin < 0 or begin + BASE > len(data):
