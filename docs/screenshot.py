@@ -1,4 +1,4 @@
-"""The picture of the report in README and tutorial: ``python docs/screenshot.py`` (needs Chromium and playwright).
+"""The pictures of the report in README and tutorial: ``python docs/screenshot.py`` (needs Chromium and playwright).
 
 It is the report of the tutorial's recording, made by the tutorial's own commands.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 HERE = Path(__file__).parent
-PICTURE = HERE / "images" / "report.png"
+IMAGES = HERE / "images"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 SIZE = {"width": 1100, "height": 880}
 
@@ -40,19 +40,20 @@ def report(folder: Path) -> Path:
     return page
 
 
-def photograph(page: Path, picture: Path) -> None:
-    """The top of a page, as Chromium shows it without network."""
+def photograph(page: Path, folder: Path) -> None:
+    """The top of a page, and its section of the rebuilt channel, as Chromium shows them without network."""
     executable = next(found for name in BROWSERS if (found := shutil.which(name)))
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=executable, args=["--no-sandbox", "--disable-gpu"])
         tab = browser.new_context(viewport=SIZE, offline=True, color_scheme="light").new_page()
         tab.goto(page.as_uri())
-        tab.screenshot(path=picture)
+        tab.screenshot(path=folder / "report.png")
+        tab.locator("#rebuilt").screenshot(path=folder / "rebuilt.png")
         browser.close()
 
 
 if __name__ == "__main__":
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    PICTURE.parent.mkdir(exist_ok=True)
+    IMAGES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as made:
-        photograph(report(Path(made)), PICTURE)
+        photograph(report(Path(made)), IMAGES)
