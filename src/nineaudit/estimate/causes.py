@@ -12,14 +12,14 @@ With rate sensors lengths by 1/f are accelerations by f. Without, the sampling i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import permutations
 
 import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray, SensorArray, frozen
-from nineaudit.estimate.calibration import features
+from nineaudit.estimate.calibration import PARAMETERS, features
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import has_rates
 from nineaudit.estimate.shapes import GAIN_SD
@@ -53,9 +53,10 @@ ALONG = 0.9
 @dataclass(frozen=True, eq=False)
 class Cause:
     """`word` the fault word, `channels` (columns) all those it touches, `undo` Data -> Data, `price` in nats, `said` in
-    words, and the `size` of it (m for a place, a factor otherwise). Where it is free: `slope` Fit of undone data ->
-    (c,k,n) change of the readings per prior standard deviation of each of c parameters, `step` (c,) of them -> the
-    cause there, and `nearest` the cause at the nearest ratio of units, if one is near."""
+    words, and the `size` of it (m for a place, a factor otherwise). `factors` of a unit: "acceleration" and
+    "angular_rate" -> what puts the readings right. Where it is free: `slope` Fit of undone data -> (c,k,n) change of
+    the readings per prior standard deviation of each of c parameters, `step` (c,) of them -> the cause there, and
+    `nearest` the cause at the nearest ratio of units, if one is near."""
 
     word: str
     channels: tuple[int, ...]
@@ -66,10 +67,11 @@ class Cause:
     slope: Callable[[Fit], FloatArray] | None = None
     step: Callable[[FloatArray], Cause] | None = None
     nearest: Callable[[], Cause | None] | None = None
+    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 def tried(array: SensorArray) -> Iterator[Cause]:
-    """Every common cause that may be far from none: factors, signs, axes."""
+    """Every common cause that may be far from none: factors, signs, axes, the sampling interval."""
     held, told = array.is_accelerometer, has_rates(array)
     for mask, kind, units in _kinds(array):
         for f in (*BESIDE, *ratios(units)):
@@ -79,6 +81,9 @@ def tried(array: SensorArray) -> Iterator[Cause]:
     if told and held.any():
         for f in ratios(TIMES):
             yield timed(len(array), f)
+        for one in ratios(_common(ACCELERATIONS)):
+            for other in ratios(_common(RATES)):
+                yield both(held, one, other)
 
 
 def near(array: SensorArray) -> Iterator[Cause]:
@@ -93,8 +98,12 @@ def near(array: SensorArray) -> Iterator[Cause]:
 
 def _kinds(array: SensorArray) -> list[tuple[BoolArray, str, Mapping[str, float]]]:
     held = array.is_accelerometer
-    kinds = [(held, ACCELEROMETERS, ACCELERATIONS)] if held.any() else []
-    return [*kinds, (~held, RATE_SENSORS, RATES)] if has_rates(array) else kinds
+    kinds: list[tuple[BoolArray, str, Mapping[str, float]]] = []
+    if held.any():
+        kinds.append((held, ACCELEROMETERS, ACCELERATIONS))
+    if has_rates(array):
+        kinds.append((~held, RATE_SENSORS, RATES))
+    return kinds
 
 
 def blocks(array: SensorArray) -> list[tuple[int, ...]]:
@@ -128,7 +137,21 @@ def scaled(mask: BoolArray, kind: str, told: bool, factor: float) -> Cause:
         slope=lambda at: GAIN_SD * np.where(mask[:, None], at.ideal.T, 0.0)[None],
         step=lambda c: by(factor / float(np.clip(1.0 + GAIN_SD * c[0], 0.5, 2.0))),
         nearest=lambda: None if (f := _nearest(factor, units)) is None else by(f),
+        factors={"acceleration" if kind == ACCELEROMETERS else "angular_rate": factor},
     )  # fmt: skip
+
+
+def both(held: BoolArray, one: float, other: float) -> Cause:
+    """All accelerometers (`held`, (k,)) by `one` factor, and all rate sensors by an`other`: both units are wrong."""
+    first, second = scaled(held, ACCELEROMETERS, True, one), scaled(~held, RATE_SENSORS, True, other)
+    return Cause(
+        "unit", tuple(range(len(held))), lambda data: second.undo(first.undo(data)), first.price + second.price,
+        f"{first.said}; and {second.said}", one, factors={**first.factors, **second.factors},
+    )  # fmt: skip
+
+
+def _common(units: Mapping[str, float]) -> dict[str, float]:
+    return {name: value for name, value in units.items() if name in COMMON}
 
 
 def timed(count: int, factor: float) -> Cause:
@@ -199,8 +222,11 @@ def _columns(mask: BoolArray) -> tuple[int, ...]:
 
 
 def _scale(mask: BoolArray, factor: float, data: Data) -> Data:
+    """The readings by a factor, their noise with them, and the zeros that the rig states in the wrong unit."""
     by = np.where(mask, factor, 1.0)
-    return replace(data, readings=data.readings * by, weight=data.weight / np.abs(by))
+    prior = data.prior_sd.copy()
+    prior[:, PARAMETERS.index("zero")] *= np.maximum(np.abs(by), 1.0)
+    return replace(data, readings=data.readings * by, weight=data.weight / np.abs(by), prior_sd=prior)
 
 
 def _stretch(factor: float, data: Data) -> Data:

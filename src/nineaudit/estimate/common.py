@@ -18,13 +18,13 @@ import numpy as np
 from nineaudit.array import FloatArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import hypotheses as h
-from nineaudit.estimate.causes import Cause, near, tried
+from nineaudit.estimate.causes import NEAR_UNIT, Cause, near, tried
 from nineaudit.estimate.condense import MEDIAN_SPREAD
 from nineaudit.estimate.hypotheses import Hypothesis
 from nineaudit.estimate.model import Data, Extra
 from nineaudit.estimate.normal import eliminate, normal_equations
 from nineaudit.estimate.point import point
-from nineaudit.estimate.separation import coarser
+from nineaudit.estimate.separation import DETECTION_NATS, coarser
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import ROUGH, Fit, fit, log_determinant
 
@@ -43,7 +43,9 @@ CLEARLY = 1.3
 """Cost of a record over that of the best channel from which causes far from none are tried: a small fault has none."""
 FEWEST, LEFT, WHOLE = 8, 0.03, 1.3
 """Blocks of rest that tell the noise; part of what is wrong with a record that a true hypothesis may leave; its cost
-over that of the noise."""
+over that of the noise, and that of the noise over what the rig says."""
+QUIETEST = 1e-2
+"""Least noise at rest, over what the rig states, that counts: below, a record is computed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,41 +78,80 @@ class Try:
 
 def mostly_explained(healthy: Fit, best: Hypothesis) -> bool:
     """Whether a hypothesis leaves so little of what is wrong with the record, over the noise that its channels have at
-    rest, that no common cause is to be looked for. Never, where nothing is known of that noise."""
-    data = healthy.data
-    rest = (data.still[:-1] > 0) & (data.still[1:] > 0)
-    if rest.sum() < FEWEST:
+    rest, that no common cause is to be looked for. Never, where nothing is known of that noise, or where it is far more
+    than the rig says, as in another unit."""
+    weighted = _at_rest(healthy.data)[:, healthy.data.used]
+    if len(weighted) < FEWEST:
         return False
-    weighted = (data.weight * data.readings)[rest][:, data.used]
     noise, spread = float(np.median(np.var(weighted, axis=0, ddof=1))), float(np.sqrt(2.0 / weighted.size))
+    if noise > WHOLE:
+        return False
     least = noise * (1.0 - 2.0 * MEDIAN_SPREAD * spread)
     return best.statistic < WHOLE * noise and best.statistic - least < LEFT * (healthy.statistic - least)
 
 
-def common_causes(healthy: Fit, best: Hypothesis, reference: float) -> list[Common]:
+def as_noisy_as_at_rest(data: Data) -> Data:
+    """`data` with the noise that each kind of sensor has at rest (median of its channels) in place of the rig's, so
+    that a record gains nothing by being shrunk into what the rig states; as it is where no rest tells it."""
+    weighted, held = _at_rest(data), data.array.is_accelerometer
+    if len(weighted) < FEWEST:
+        return data
+    seen, found = np.std(weighted, axis=0, ddof=1), np.ones(len(held))
+    for kind in (held & data.used, ~held & data.used):
+        if kind.any():
+            found[kind] = max(float(np.median(seen[kind])), QUIETEST)
+    return replace(data, weight=data.weight / found)
+
+
+def _at_rest(data: Data) -> FloatArray:
+    """(m,k) weighted readings of the blocks that lie wholly at rest."""
+    return np.asarray((data.weight * data.readings)[(data.still[:-1] > 0) & (data.still[1:] > 0)])
+
+
+def common_causes(healthy: Fit, best: Hypothesis | None, reference: float) -> list[Common]:
     """The common causes that may explain the record as well as the `best` hypothesis of a channel, fitted, best first;
-    `reference`: log evidence of no fault."""
+    `reference`: log evidence of no fault. Where no channel was looked at (None), those that beat no fault."""
     at = coarser(healthy, COARSE)
     data = replace(at.data, extra=None)
-    least = PART * best.evidence - SPARE
-    close = [(promised(at, cause), cause) for cause in near(data.array)]
+    least = DETECTION_NATS if best is None else PART * best.evidence - SPARE
+    alone = tied(at, np.zeros((0, len(data.array), len(data.time))))
+    close = [(promised(at, cause, alone), cause) for cause in near(data.array)]
     close = [x for x in close if x[0] > least]
     scale = any(cause.word == "unit" for _, cause in close)
-    far = _far(at, data, best) if scale or healthy.statistic > CLEARLY * best.statistic else []
+    clear = best is None or healthy.statistic > CLEARLY * best.statistic
+    far = _far(at, data, best) if scale or clear else []
     likely = [Try(x.cause, fit(x.cause.undo(data), x.required.omega, None, LOOKS)) for x in far[:TRIED]]
     likely += [Try(cause, at) for _, cause in sorted(close, key=lambda x: -x[0])[:TRIED]]
     if not likely:
         return []
     coarse = h.log_evidence(fit(data, at.omega, at.theta, LOOKS))
     settled = [x for y in likely if _evidence(x := _freed(data, y)) - coarse > least]
-    whole = [_whole(healthy.data, x, reference) for x in settled]
+    whole = [_whole(healthy.data, x, reference) for x in _once(settled)]
     return sorted(whole, key=lambda x: -x.found.evidence)
 
 
-def _far(at: Fit, data: Data, best: Hypothesis) -> list[Try]:
+def _once(settled: list[Try]) -> list[Try]:
+    """Without those that came to the same cause from another start."""
+    kept: list[Try] = []
+    for x in sorted(settled, key=lambda x: x.statistic):
+        if not any(_same(x.cause, y.cause) for y in kept):
+            kept.append(x)
+    return kept
+
+
+def _same(one: Cause, other: Cause) -> bool:
+    """Whether two causes are one, their sizes within what tells units apart."""
+    alike = one.said == other.said or (one.word, one.step is None) == (other.word, other.step is None) == (
+        "unit",
+        False,
+    )
+    return alike and one.channels == other.channels and abs(one.size / other.size - 1.0) < NEAR_UNIT
+
+
+def _far(at: Fit, data: Data, best: Hypothesis | None) -> list[Try]:
     """Causes that may be far from none, as good as the record without the best channel, the best first."""
     certain = replace(data, prior_sd=np.zeros_like(data.prior_sd))
-    enough = AS_GOOD * _beside(certain, best, at.omega)
+    enough = np.inf if best is None else AS_GOOD * _beside(certain, best, at.omega)
     far = [found for cause in tried(data.array) if (found := _look(certain, cause)).statistic < enough]
     return sorted(far, key=lambda x: x.statistic)
 
@@ -172,12 +213,13 @@ def tied(at: Fit, shapes: FloatArray) -> tuple[FloatArray, float, float]:
     return np.asarray(step[base:]), solved.fall + float(pull @ step), log_determinant(precision)
 
 
-def promised(at: Fit, cause: Cause) -> float:
-    """Evidence (nats, over no fault) of a small common cause, linear about the fit of no fault."""
+def promised(at: Fit, cause: Cause, alone: tuple[FloatArray, float, float]) -> float:
+    """Evidence (nats, over no fault) of a small common cause, linear about the fit of no fault. What the fit would
+    still gain without a cause, `alone` = tied(at, no shapes), is none of its: a coarser record is not yet settled."""
     if cause.slope is None:
         return 0.0
     _, fall, log_det = tied(at, cause.slope(at))
-    return 0.5 * (fall - log_det + at.log_det)
+    return 0.5 * (fall - alone[1] - log_det + alone[2])
 
 
 def _whole(data: Data, at: Try, reference: float) -> Common:
