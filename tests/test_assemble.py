@@ -215,6 +215,16 @@ def test_a_number_that_no_unit_can_hold_is_no_reading() -> None:
     found = assembled((GRID, huge), same(), same())
     assert np.flatnonzero(~found.valid[:, 0]).tolist() == [7]
     assert np.isnan(found.native[0].values[7])
+    assert "p: 1 number beyond 1e+75 m/s² or rad/s, no readings" in found.source.notes
+
+
+def test_stamps_that_are_no_times_are_left_out_and_said() -> None:
+    odd = np.where(np.arange(200) == 9, 1e300, GRID)
+    found = assembled(same(), (odd, line(GRID)), same())
+    assert found.native[1].time.tolist() == np.delete(GRID, 9).tolist()
+    assert any(note.startswith("q: 1 sample stamped 1e+300 s") for note in found.source.notes)
+    with pytest.raises(RecordingError, match=r"channel p: .*no times in seconds; found '1.7e\+18 s'; .*time_unit"):
+        assembled(*[(1.7e18 + GRID * 1e9, line(GRID))] * 3)
 
 
 # --- units --------------------------------------------------------------------------------------------------------

@@ -23,7 +23,23 @@ from nineaudit.readers.mcap_log import read_mcap
 
 SEVERAL = settings(derandomize=True, max_examples=80, deadline=None)
 PATHS = ["p", "v.x", "v.y", "s.1.value", "s.0.value", "list.2"]
-ODD = [None, True, 2**53 + 1, "1", [], {}, [[1]], 10**30, 2**63, -(2**63), float("nan"), float("inf"), 1e-320, -0.0]
+ODD = [
+    None,
+    True,
+    10**400,
+    2**53 + 1,
+    "1",
+    [],
+    {},
+    [[1]],
+    10**30,
+    2**63,
+    -(2**63),
+    float("nan"),
+    float("inf"),
+    1e-320,
+    -0.0,
+]
 
 
 def number(draw: random.Random) -> Any:
@@ -146,3 +162,28 @@ def test_integers_of_time_keep_their_digits(tmp_path: Path, monkeypatch: pytest.
     logged = read_mcap(path, rig_of("/imu:p", recording='[recording]\ntime="/other:stamp_ns"\n'))
     np.testing.assert_array_equal([t for t, _ in pairs(logged)], np.arange(40) * 1e-9)
     assert logged.notes == ("no time signal '/other:stamp_ns' in topic /imu: the log times are taken",)
+
+
+def test_integers_of_hundreds_of_digits_are_no_readings(tmp_path: Path) -> None:
+    path = logged(tmp_path, [(i, {"p": 10**400, "q": i}) for i in range(9)])
+    p, q = read_mcap(path, rig_of("/imu:p", "/imu:q")).traces
+    assert np.isnan(p.values).all()
+    assert q.values.tolist() == list(range(9))
+
+
+def test_stamps_of_the_next_century_keep_their_digits(tmp_path: Path) -> None:
+    path = logged(tmp_path, [(2**63 - 10 + i, {"p": i}) for i in range(9)])
+    assert read_mcap(path, rig_of("/imu:p")).traces[0].time.tolist() == [i * 1e-9 for i in range(9)]
+
+
+def logged(folder: Path, messages: list[tuple[int, Any]]) -> Path:
+    """A log of (log time, message) on /imu."""
+    path = folder / "made.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/imu", "json", writer.register_schema("s", "jsonschema", b"{}"))
+        for time, message in messages:
+            writer.add_message(channel, log_time=time, publish_time=0, data=json.dumps(message).encode())
+        writer.finish()
+    return path

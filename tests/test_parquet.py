@@ -94,3 +94,12 @@ def test_flipped_and_cut_files_end_in_a_recording_or_one_of_our_errors(tmp_path:
             ends[True] += 1
             assert np.isfinite(found.time).all()
     assert min(ends.values()) > 0
+
+
+def test_integers_beyond_what_floats_hold_and_durations(tmp_path: Path) -> None:
+    path, p = tmp_path / "t.parquet", np.arange(COUNT, dtype=np.uint64) + np.uint64(2**63)
+    durations = pa.array([i * 10 for i in range(COUNT)], pa.duration("ms"))
+    pq.write_table(pa.table({"t_s": durations, "p": p, "q": p.astype(np.int64) // 3}), path)
+    found = read_parquet(path, RIG)
+    np.testing.assert_array_equal(found.traces[0].values, p.astype(np.float64))
+    np.testing.assert_array_equal(found.traces[0].time, np.arange(COUNT) * 10 * 1e-3)

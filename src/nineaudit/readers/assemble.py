@@ -16,6 +16,7 @@ from nineaudit.readers.contents import Contents
 from nineaudit.readers.resample import resample_columns
 from nineaudit.recording import Alignment, Clock, Recording, Source, Trace
 from nineaudit.signals import si_factor
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
@@ -24,6 +25,8 @@ LEAST_SAMPLES: Final = 8
 """Fewer samples than this are no recording."""
 LARGEST: Final = 1e75
 """m/s² or rad/s beyond which a number is no reading: its fourth power could not be held."""
+LATEST_S: Final = 1e11
+"""Seconds (3000 years): a stamp beyond is no time, or not in seconds."""
 EPOCH_S: Final = 1e6
 """Later first stamps (11 days) are dates: as floating-point seconds they keep only parts of a microsecond."""
 
@@ -40,9 +43,10 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     Raises RecordingError: too few samples, or no time that the traces have in common; ConfigurationError: a unit.
     """
     by_channel = {trace.channel: trace for trace in contents.traces}
-    traces = [by_channel[sensor.channel] for sensor in rig.array.sensors]
-    origin, notes = _origin(traces)
-    native, clocks = _on_their_clocks([_in_si(trace, rig) for trace in traces], origin)
+    traces, notes = _of_our_age([by_channel[sensor.channel] for sensor in rig.array.sensors], source)
+    origin, dated = _origin(traces)
+    inside, huge = zip(*(_in_si(trace, rig) for trace in traces), strict=True)
+    native, clocks = _on_their_clocks(inside, origin)
     shared = _shared(native, source) if u_parts else (-np.inf, np.inf)
     base = max(range(len(native)), key=lambda i: _inside(native[i].time, shared).size)
     time = _inside(native[base].time, shared)
@@ -57,7 +61,7 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
         readings=readings,
         valid=read_only(np.isfinite(readings)),
         rig=alignment.with_timing(rig, alignments),
-        source=replace(source, notes=(*source.notes, *notes, *cut, *said, *stated)),
+        source=replace(source, notes=(*source.notes, *notes, *dated, *filter(None, huge), *cut, *said, *stated)),
         native=native,
         clocks=clocks,
         resampled=tuple(a.channel for a in alignments),
@@ -147,14 +151,37 @@ def _origin(traces: Sequence[Trace]) -> tuple[float, tuple[str, ...]]:
     return first, (f"time stamps are dates; they are counted from the first, {first!r} s",)
 
 
-def _in_si(trace: Trace, rig: Rig) -> Trace:
-    """Values in SI, calibrated; NaN where there is no number that can be a reading."""
+def _of_our_age(traces: Sequence[Trace], source: Source) -> tuple[list[Trace], list[str]]:
+    """The traces without samples whose stamps are no times, and a note on those. RecordingError: too few left."""
+    kept, notes = list[Trace](), list[str]()
+    for trace in traces:
+        good = np.abs(trace.time) < LATEST_S
+        if np.count_nonzero(good) < min(LEAST_SAMPLES, trace.time.size):
+            raise RecordingError(
+                "time stamps that are no times in seconds",
+                file=source.path,
+                place=f"channel {trace.channel}",
+                found=f"{trace.time[~good][0]:.6g} s",
+                advice="state their unit in the rig file ([recording] time_unit)",
+            )
+        if not good.all():
+            said = f"{trace.channel}: {counted(int((~good).sum()), 'sample')} stamped {trace.time[~good][0]:.6g} s"
+            notes.append(f"{said} or the like, which is no time, left out")
+            trace = replace(trace, time=trace.time[good], values=trace.values[good])
+        kept.append(trace)
+    return kept, notes
+
+
+def _in_si(trace: Trace, rig: Rig) -> tuple[Trace, str]:
+    """Values in SI, calibrated, NaN where there is no number that can be a reading; and what is said of those."""
     sensor = rig.array[trace.channel]
     with np.errstate(over="ignore"):
         values = trace.values * si_factor(sensor, trace.unit)
         values -= sensor.offset
+    huge = int(np.count_nonzero(np.abs(values) >= LARGEST))
     values[~(np.abs(values) < LARGEST)] = np.nan
-    return replace(trace, values=read_only(values))
+    said = f"{trace.channel}: {counted(huge, 'number')} beyond {LARGEST:g} m/s² or rad/s, no readings" if huge else ""
+    return replace(trace, values=read_only(values)), said
 
 
 def _on_their_clocks(traces: Sequence[Trace], origin: float) -> tuple[tuple[Trace, ...], tuple[Clock, ...]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -69,7 +70,7 @@ def is_number(value: Any) -> bool:
     """Whether a decoded value is a finite number that a float can hold."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
-    return bool(abs(value) <= np.finfo(np.float64).max)
+    return abs(value) <= sys.float_info.max  # exact, where an integer has hundreds of digits
 
 
 def number_at(data: Data, dtype: str) -> Numbers:

@@ -174,7 +174,7 @@ def _counts_ns(column: Column, scale: int) -> bool:
 def _first_ns(stamps: Column) -> int:
     """The earliest time in ns, 0 where there is none."""
     found = stamps.values[stamps.there]
-    return int(found.min(initial=2**62) * (1 if found.dtype.kind == "i" else 1e9)) if len(found) else 0
+    return int(found.min() * (1 if found.dtype.kind == "i" else 1e9)) if len(found) else 0
 
 
 def _seconds(stamps: Column, base: int) -> Column:

@@ -49,6 +49,9 @@ def read_parquet(path: Path, rig: Rig) -> Contents:
         found = replace(found, scale=factor(time.type.unit, "time"), notes=())
         stamps, start = _ticks(time)
         notes.append(f"time is counted from {start}")
+    elif pa.types.is_duration(time.type):
+        found = replace(found, scale=factor(time.type.unit, "time"), notes=())
+        stamps = _numbers(time.cast(pa.int64()), path, schema.names[found.time])
     else:
         stamps = _numbers(time, path, schema.names[found.time])
     values = [_numbers(table.column(schema.names[i]), path, schema.names[i]) for i in found.channels]
@@ -102,7 +105,7 @@ def _numbers(column: Any, path: Path, name: str) -> FloatArray:
     import pyarrow as pa
 
     try:
-        return columns.floats(column.cast(pa.float64()))
+        return columns.floats(column.cast(pa.float64(), safe=not pa.types.is_integer(column.type)))
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
         raise RecordingError(
             "a column that does not hold numbers",
