@@ -55,7 +55,7 @@ def _fitted(found: Calibrated, k: int, p: int, one: float) -> str:
         return DASH
     decimals = max(1 - math.floor(math.log10(u / one)), 0) if u > 0 else 2
     star = " *" if abs(value) > _PULLED * prior else ""
-    return f"{value / one:+.{decimals}f} ± {u / one:.{decimals}f}{star}".replace("-", "−")
+    return f"{value / one:+z.{decimals}f} ± {u / one:.{decimals}f}{star}".replace("-", "−")
 
 
 def _zero(audit: Audit, k: int, sensor: Sensor) -> str:

@@ -18,12 +18,12 @@ DECISIONS = (
     ("rejected", "rejected"),
 )
 FIELDS = (
-    ("test", "Test number", "text"),
-    ("item", "Test item and its serial number", "text"),
-    ("tested_on", "Date of the test", "date"),
-    ("laboratory", "Laboratory", "text"),
-    ("reviewer", "Reviewer", "text"),
-    ("reviewed_on", "Date of the review", "date"),
+    ("test", "Test number"),
+    ("item", "Test item and its serial number"),
+    ("tested_on", "Date of the test, YYYY-MM-DD"),
+    ("laboratory", "Laboratory"),
+    ("reviewer", "Reviewer"),
+    ("reviewed_on", "Date of the review, YYYY-MM-DD"),
 )
 SIGNATURES = ("Test engineer", "Reviewer")
 

@@ -138,6 +138,8 @@
       u.destroy();
       box.remove();
       plot.classList.remove("is-zoomed");
+      delete plot.dataset.opened;
+      plot.querySelector(".zoom-open").focus({ preventScroll: true });
     };
     const again = () => u.redraw(false);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
@@ -171,7 +173,11 @@
   if (supported) {
     for (const plot of document.querySelectorAll("[data-plot]")) {
       const told = JSON.parse(plot.dataset.plot);
-      const start = () => { if (!plot.classList.contains("is-zoomed")) open(plot, told); };
+      const start = () => {
+        if (plot.dataset.opened) return;
+        plot.dataset.opened = "yes";
+        open(plot, told);
+      };
       const button = made("button", "zoom-open", "Zoom");
       const more = made("span", "sr", ` into ${told.title}`);
       button.type = "button";
