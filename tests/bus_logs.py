@@ -37,7 +37,7 @@ KEYS = {"id", "cycle", "frames", "jitter", "skip", "twice", "damage", "short", "
 
 def bus_from(case: Mapping[str, Any]) -> Bus:
     assert set(case) <= {"send", "bit_rate"}
-    return bus_of(log_of(case["send"]), load_databases([DBC]), {IMU}, case.get("bit_rate"))
+    return bus_of(log_of(case["send"]), load_databases([DBC]), {IMU: 0}, case.get("bit_rate"))
 
 
 def log_of(sent: Sequence[Mapping[str, Any]]) -> Frames:

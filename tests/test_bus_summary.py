@@ -43,7 +43,7 @@ def test_every_frame_with_a_flipped_bit_has_a_wrong_checksum(damage: list[int]) 
 def test_a_checksum_that_no_method_gives_is_not_judged() -> None:
     log = log_of([{"id": IMU, "cycle": 0.01, "frames": FRAMES}])
     log.data[:, 7] = np.random.default_rng(1).integers(0, 256, FRAMES)
-    (found,) = bus_of(log, load_databases([DBC]), {IMU}).identifiers[0].checksums
+    (found,) = bus_of(log, load_databases([DBC]), {IMU: 0}).identifiers[0].checksums
     assert found.method is None
 
 
@@ -78,7 +78,7 @@ def test_bits_of_frames() -> None:
     """Eight bytes are 111 bits, 135 with all stuff bits; 29-bit identifiers 131 and 160 (Davis et al. 2007, 2.1)."""
     one = frames([0], [5], [0], [0], [8], np.zeros((1, 8), dtype=np.uint8))
     other = frames([0], [5 | EXTENDED], [1], [0], [8], np.zeros((1, 8), dtype=np.uint8))
-    loads = bus_of(joined([one, other], buses=("a", "b")), (), ()).loads
+    loads = bus_of(joined([one, other], buses=("a", "b")), (), {}).loads
     assert [(x.bus, x.least, x.most) for x in loads] == [("a", 111, 135), ("b", 131, 160)]
 
 
@@ -86,13 +86,13 @@ def test_restarts_are_of_one_bus() -> None:
     """Two buses may be logged one after the other in batches."""
     time, bus = np.array([0, 2, 4, 1, 3, 5, 2]), [0, 0, 0, 1, 1, 1, 1]
     log = frames(time * 10**9, np.full(7, 5), bus, np.zeros(7), np.full(7, 8), np.zeros((7, 8), dtype=np.uint8))
-    found = bus_of(joined([log], buses=("a", "b")), (), ())
+    found = bus_of(joined([log], buses=("a", "b")), (), {})
     assert (found.restarts, found.first_restart) == (1, 2.0)
 
 
 def test_error_frames_are_no_identifier_and_no_load() -> None:
     log = frames([0, 1], [0, 7], [0, 0], [ERROR, FD], [0, 8], np.zeros((2, 8), dtype=np.uint8))
-    found = bus_of(joined([log], buses=("a",)), (), ())
+    found = bus_of(joined([log], buses=("a",)), (), {})
     assert [x.key for x in found.identifiers] == [7]
     assert found.loads[0].least == 111
     assert found.fd

@@ -13,6 +13,7 @@ import pytest
 
 from nineaudit.auditing import audit
 from nineaudit.errors import RecordingError
+from nineaudit.finding import Verdict
 from nineaudit.readers import can_log, read
 from nineaudit.readers.can_frames import ERROR, FD, REMOTE, Frames, frames
 from nineaudit.rig import Rig, parse_rig
@@ -154,3 +155,15 @@ def test_a_log_of_odd_numbers_is_audited(name: str, reader: Any) -> None:
     assert all(text in reasons for text in FINDINGS[name].says), reasons
     assert (np.diff(found.time) > 0).all()
     assert len(found.native) == len(FINDINGS[name].signals)
+
+
+def test_a_copy_on_another_bus_is_told_apart(reader: Any) -> None:
+    """The rig takes the message from the bus that has most of it: that its copy stands still does not matter to it."""
+    bus = np.r_[np.zeros(30), np.ones(20)].astype(int)
+    copied = log(bus=bus, time=np.r_[EVENLY[:30], EVENLY[:20]], data=np.where(bus[:, None] == 1, 7, SMALL).astype("u1"))
+    found = reader(Case(copied, ("IMU.A",), ()))
+    assert [(x.bus, x.used, x.constant) for x in found.bus.identifiers] == [("1", True, False), ("2", False, True)]
+    verdicts = {f.rule: f.verdict for f in audit(found).findings}
+    assert verdicts["CB111"] is Verdict.PASS
+    turned = reader(Case(log(bus=1 - bus, data=SMALL * 0, time=copied.time), ("IMU.A",), ()))
+    assert any("0x10 IMU on bus 2: all 30 frames are equal" in f.reason for f in audit(turned).findings)

@@ -130,6 +130,12 @@ def _concerned(case: Case, whose: Callable[[Identifier], bool], unless: str) -> 
     return found or NotApplicable(unless)
 
 
+def _named(x: Identifier, case: Case) -> str:
+    """The message, with its bus where the log has several."""
+    buses = {y.bus for y in case.recording.bus.identifiers} if case.recording.bus else set()
+    return f"{x.label} on bus {x.bus}" if len(buses) > 1 else x.label
+
+
 def _worst(
     case: Case,
     whose: Callable[[Identifier], bool],
@@ -145,7 +151,7 @@ def _worst(
     worst = max(found, key=value)
     beyond = sum(value(x) > limit for x in found)
     others = f" ({beyond} of {len(found)} messages beyond)" if beyond > 1 else ""
-    return Measure(value(worst), limit, "1", detail=f"{worst.label}{others}: {told(worst)}")
+    return Measure(value(worst), limit, "1", detail=f"{_named(worst, case)}{others}: {told(worst)}")
 
 
 def _total(
@@ -164,7 +170,7 @@ def _total(
     worst, total = max(found, key=count), sum(map(count, found))
     others = sum(count(x) > 0 for x in found) - 1
     more = f", and {counted(others, 'more message')}" if others > 0 else ""
-    detail = f"{worst.label}: {told(worst)}{more}; in all" if total else f"{counted(len(found), 'message')},"
+    detail = f"{_named(worst, case)}: {told(worst)}{more}; in all" if total else f"{counted(len(found), 'message')},"
     return Measure(float(total), float(limit), unit, detail=detail)
 
 

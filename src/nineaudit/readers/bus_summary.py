@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -21,8 +21,9 @@ _CYCLE: Final = 1e-3
 _STANDARD: Final = 1 << 11
 
 
-def bus_of(log: Frames, messages: Sequence[Any], used: Container[int], bit_rate: float | None = None) -> Bus:
-    """Summary of all frames. `messages` of the databases, `used` keys that the rig takes signals from."""
+def bus_of(log: Frames, messages: Sequence[Any], used: Mapping[int, int], bit_rate: float | None = None) -> Bus:
+    """Summary of all frames. `messages` of the databases, `used`: keys that the rig takes signals from,
+    and from which of the log's buses each."""
     known = {BusSignal(m, None).key: m for m in messages}
     found = tuple(_identifier(log, rows, known, used) for rows in _groups(log))
     seen = {x.key for x in found}
@@ -52,7 +53,7 @@ def _numbered(key: NDArray[np.uint32]) -> NDArray[Any]:
     return out
 
 
-def _identifier(log: Frames, rows: Rows, known: Mapping[int, Any], used: Container[int]) -> Identifier:
+def _identifier(log: Frames, rows: Rows, known: Mapping[int, Any], used: Mapping[int, int]) -> Identifier:
     key, message = int(log.key[rows[0]]), known.get(int(log.key[rows[0]]))
     time, payload, length = log.time[rows], log.payload(rows), log.length[rows]
     steps = np.diff(time) / 1e9
@@ -62,7 +63,7 @@ def _identifier(log: Frames, rows: Rows, known: Mapping[int, Any], used: Contain
         key=key,
         name=None if message is None else message.name,
         bus=log.buses[log.bus[rows[0]]],
-        used=key in used,
+        used=used.get(key) == int(log.bus[rows[0]]),
         frames=len(rows),
         first=(int(time.min()) + log.origin) / 1e9,
         last=(int(time.max()) + log.origin) / 1e9,

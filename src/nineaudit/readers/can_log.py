@@ -84,7 +84,7 @@ def read_can(path: Path, rig: Rig) -> Contents:
         "undecodable_frames": float(sum(undecodable for _, undecodable in bad.values())),
         "unavailable_values": float(silent),
     }
-    bus = bus_of(log, messages, rows, databases.bit_rate)
+    bus = bus_of(log, messages, {key: int(log.bus[r[0]]) for key, r in rows.items()}, databases.bit_rate)
     said = (*log.notes, *dated, *notes, *databases.notes)
     return Contents(tuple(traces), counts, said, (*log.damage, *_cut(databases)), bus)
 
