@@ -152,9 +152,18 @@ def _finding(finding: FindingModel) -> dict[str, str]:
     }
 
 
+def _words(value: Any) -> str:
+    """A value of the document; lists and objects as people read them."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name.replace('_', ' ')} {_words(one)}" for name, one in value.items())
+    if isinstance(value, list):
+        return ("; " if any(isinstance(one, dict) for one in value) else " to ").join(map(_words, value))
+    return str(value)
+
+
 def _provenance(result: ResultModel) -> list[tuple[str, str]]:
     return [
-        *((f"Recording {name.replace('_', ' ')}", str(value)) for name, value in result.recording.items()),
+        *((f"Recording {name.replace('_', ' ')}", _words(value)) for name, value in result.recording.items()),
         *((f"Rig {name}", value) for name, value in result.rig.items()),
         *((f"Rulebook {name}", value) for name, value in result.rulebook.items()),
         *(("nineaudit" if name == "version" else name, version) for name, version in result.tool.items()),
