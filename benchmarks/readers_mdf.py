@@ -25,7 +25,7 @@ DBC = 'VERSION ""\nBU_: S\n' + "".join(
 )
 
 
-def write(path: Path, dbc: Path, count: int) -> None:
+def write(path: Path, count: int) -> None:
     """`count` frames of random data at 10 kHz, as ASAM bus logging has them."""
     from asammdf import MDF, Signal, Source
     from can.io.mf4 import STD_DTYPE
@@ -68,7 +68,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path, dbc = Path(folder) / "log.mf4", Path(folder) / "log.dbc"
         dbc.write_text(DBC, encoding="utf-8")
-        write(path, dbc, count)
+        write(path, count)
         took = {}
         for name, way in (("asammdf", by_asammdf), ("nineaudit", by_nineaudit)):
             start = time.perf_counter()

@@ -233,7 +233,8 @@ def test_an_export_for_a_spreadsheet(tmp_path: Path) -> None:
 def test_a_packed_table_is_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(gzip.compress(("t_s,p,q\n" + rows()).encode()))
-    with pytest.raises(RecordingError, match=r"(gzip archive.*|unknown kind of file; found '\.gz'.*); unpack it and read"):
+    says = r"(gzip archive.*|unknown kind of file; found '\.gz'.*); unpack it and read"
+    with pytest.raises(RecordingError, match=says):
         read(path, RIG)
 
 

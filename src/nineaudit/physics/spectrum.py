@@ -26,4 +26,4 @@ def density(values: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
     segments = np.lib.stride_tricks.sliding_window_view(whole, length)[:: max(length // 2, 1)]
     power = (np.abs(np.fft.rfft(segments * window, axis=1)) ** 2).mean(axis=0)
     density = np.sqrt(2.0 * power / (rate * (window**2).sum()))
-    return np.fft.rfftfreq(length, 1.0 / rate)[1:], density[1:]
+    return np.asarray(np.fft.rfftfreq(length, 1.0 / rate)[1:]), np.asarray(density[1:])

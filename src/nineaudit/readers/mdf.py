@@ -66,7 +66,7 @@ def opened(path: Path) -> Iterator[Any]:
         ) from error
     _require_whole(path)
     try:
-        with MDF(path, process_bus_logging=False) as log:  # type: ignore[call-arg]  # passed on by **kwargs
+        with MDF(path, process_bus_logging=False) as log:  # type: ignore[call-arg]  # among its **kwargs  # type: ignore[call-arg]  # passed on by **kwargs
             yield log
     except (MdfException, ValueError, KeyError, IndexError, struct.error) as error:
         raise cut_short(path, " ".join(str(error).split())[:120], "no frames") from error
