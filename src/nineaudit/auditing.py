@@ -43,6 +43,8 @@ class AuditVerdict(StrEnum):
 
 
 T = TypeVar("T")
+PACKAGES = ("numpy", "scipy", "pyarrow", "python-can", "cantools", "mcap")
+"""What numbers of a recording pass through."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,8 +194,8 @@ def judge(findings: Iterable[Finding]) -> AuditVerdict:
 
 
 def versions() -> dict[str, str]:
-    """Versions of nineaudit, Python, numpy and scipy, for the record."""
-    packages = {name: version(name) for name in ("nineaudit", "numpy", "scipy")}
+    """Versions of nineaudit, of Python, and of the packages that read and compute, for the record."""
+    packages = {name: version(name) for name in ("nineaudit", *PACKAGES)}
     return {"version": packages.pop("nineaudit"), "python": platform.python_version(), **packages}
 
 

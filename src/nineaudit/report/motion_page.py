@@ -11,7 +11,8 @@ from nineaudit.finding import COVERAGE_FACTOR
 from nineaudit.report.chart import Band, Chart, Line
 from nineaudit.report.figures import AXES, Figure, figure
 from nineaudit.report.numbers import DASH, digits, edge, quantity, spelled
-from nineaudit.report.page import style, template
+from nineaudit.report.page import script, template
+from nineaudit.report.zoom import store, zoomable
 
 if TYPE_CHECKING:
     from nineaudit.motion import Kinematics
@@ -22,13 +23,15 @@ ANGLES = ("yaw", "pitch", "roll")
 
 def render_motion(found: Kinematics, rig: Rig, name: str) -> str:
     """The page as a string of HTML; `name` of the recording."""
-    context = style() | {
+    drawn = zoomable(figures(found, rig))
+    context = script() | {
         "name": name,
         "rig": rig.name,
         "method": found.method,
         "notes": found.notes,
         "values": value_rows(found, rig),
-        "figures": figures(found, rig),
+        "figures": drawn,
+        "store": store(drawn),
     }
     return template("motion.html.j2").render(context) + "\n"
 

@@ -99,7 +99,7 @@
     };
     const height = Math.max(told.height, 180) + 30;
     const u = new uPlot({
-      width: area.clientWidth, height, series, bands,
+      width: area.clientWidth, height, series, bands, pxAlign: 0,
       legend: { show: false },
       scales: { x: { time: false } },
       axes: [{ ...axis, size: 30 }, { ...axis, size: 60 }],
