@@ -10,7 +10,9 @@ import pytest
 from nineaudit.array import SensorArray, frozen
 from nineaudit.case import Case
 from nineaudit.diagnose import Diagnosis, Status, diagnose
-from nineaudit.estimate.causes import blocks, ratios
+from nineaudit.estimate.causes import Cause, blocks, ratios
+from nineaudit.estimate.common import as_noisy_as_at_rest, promised, tied
+from nineaudit.estimate.separation import coarser
 from nineaudit.recording import Recording
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.simulate import simulate
@@ -69,3 +71,22 @@ def test_ratios_hold_the_units_of_the_trade() -> None:
     for wanted in (G0, 1 / G0, 1e3, 1e-3):
         assert min(abs(f / wanted - 1.0) for f in found) < 1e-9
     assert blocks(parse_rig(preset_text("naap-3222")).array) == [(0, 1, 2), (3, 4), (5, 6), (7, 8)]
+
+
+def test_what_an_unsettled_fit_would_gain_by_itself_is_no_promise_of_a_cause() -> None:
+    """A cause that changes no reading promises nothing, on a coarser record whose fit has yet to settle."""
+    at = coarser(Case(recorded("naap-3222", "oblique")).healthy, 250)
+    none = np.zeros((1, len(at.data.array), len(at.data.time)))
+    nothing = Cause("unknown", (), lambda data: data, 0.0, "nothing", slope=lambda _: none)
+    alone = tied(at, none[:0])
+    assert alone[1] > 0.0
+    assert abs(promised(at, nothing, alone)) < 1e-9 * max(1.0, alone[1])
+
+
+@pytest.mark.parametrize("factor", [0.05, 1 / G0, G0])
+def test_shrinking_a_record_gains_nothing_in_the_noise_at_rest(factor: float) -> None:
+    """What its residuals weigh is the same in every unit."""
+    found = recorded("naap-gyro", "oblique")
+    held = found.rig.array.is_accelerometer
+    whole, other = (as_noisy_as_at_rest(Case(x).fit_data) for x in (found, scaled(found, held, factor)))
+    np.testing.assert_allclose(other.weight * other.readings, whole.weight * whole.readings, rtol=1e-6, atol=1e-9)

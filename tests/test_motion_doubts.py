@@ -100,6 +100,17 @@ def test_a_wrong_unit_of_all_channels_is_named_before_the_numbers(factor: float,
     assert right.warnings == ()
 
 
+def test_units_of_both_kinds_are_named_at_once_and_a_second_conversion_by_its_factor() -> None:
+    one = record("naap-gyro")
+    held = one.rig.array.is_accelerometer
+    both = motion_of(Case(replace(one, readings=np.where(held, G0, 180.0 / np.pi) * one.readings)), count=0)
+    assert both.wrong_unit
+    assert "all accelerations are in m/s^2, it seems, not in g_0; all rates are in deg/s" in both.warnings[0]
+    twice = motion_of(Case(replace(one, readings=np.where(held, 1.0 / G0, 1.0) * one.readings)), count=0)
+    assert twice.wrong_unit
+    assert "all accelerometers fit when multiplied by 9.807" in twice.warnings[0]
+
+
 # Layouts
 
 
