@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from nineaudit import can_bits
-from nineaudit.readers.blf import read_blf
+from nineaudit.readers.can.blf import read_blf
 
 TURNS = 3
 CONTAINER = 128 * 1024

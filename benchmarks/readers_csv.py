@@ -18,7 +18,7 @@ ASKED_MIB = 300.0
 _OURS = """
 import resource, sys, time
 from pathlib import Path
-from nineaudit.readers.csv_table import read_text_table
+from nineaudit.readers.tables.csv_table import read_text_table
 from nineaudit.rig import parse_rig
 rig = parse_rig(Path(sys.argv[2]).read_text())
 import pyarrow.csv

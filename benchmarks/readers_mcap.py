@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from nineaudit.readers.mcap_log import read_mcap
+from nineaudit.readers.mcap.reader import read_mcap
 from nineaudit.rig import parse_rig
 
 ASKED = {"ros2": 40.0, "protobuf": 10.0, "json": 2.5}

@@ -1,6 +1,6 @@
 """MF4: raw frames to decoded signals, against asammdf's own extract_bus_logging, in one run on one file.
 
-    python benchmarks/readers_mdf.py --count 500000
+python benchmarks/readers_mdf.py --count 500000
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from nineaudit.can_bits import decode
 from nineaudit.can_database import load_databases
-from nineaudit.readers.mdf import read_mdf
+from nineaudit.readers.can.mdf import read_mdf
 
 ASKED = 2.5
 MESSAGES, SIGNALS = 20, 4

@@ -23,9 +23,9 @@ import cantools
 import numpy as np
 
 from nineaudit import can_bits
-from nineaudit.readers.asc import read_asc
-from nineaudit.readers.can_frames import Frames
-from nineaudit.readers.candump import read_candump
+from nineaudit.readers.can.asc import read_asc
+from nineaudit.readers.can.candump import read_candump
+from nineaudit.readers.can.frames import Frames
 
 FIGURES = {".log": 20.0, ".asc": 18.0}
 READERS: dict[str, Callable[[Path], Frames]] = {".log": read_candump, ".asc": read_asc}
@@ -112,7 +112,7 @@ def peak(path: Path) -> int:
     """Bytes that reading adds to a process of its own."""
     code = (
         "import pathlib, re, sys\n"
-        "from nineaudit.readers.asc import read_asc\nfrom nineaudit.readers.candump import read_candump\n"
+        "from nineaudit.readers.can.asc import read_asc\nfrom nineaudit.readers.can.candump import read_candump\n"
         "status = pathlib.Path('/proc/self/status')\n"
         "use = lambda: int(re.search(r'VmHWM:\\s+(\\d+)', status.read_text())[1])\nbefore = use()\n"
         f"log = {READERS[path.suffix].__name__}(pathlib.Path(sys.argv[1]))\nprint((use() - before) * 1024)\n"

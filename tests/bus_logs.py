@@ -26,8 +26,8 @@ import numpy as np
 from nineaudit.bus import Bus
 from nineaudit.can_bits import encode
 from nineaudit.can_database import load_databases
-from nineaudit.readers.bus_summary import bus_of
-from nineaudit.readers.can_frames import Frames, frames, joined
+from nineaudit.readers.can.bus_summary import bus_of
+from nineaudit.readers.can.frames import Frames, frames, joined
 
 DBC = Path(__file__).parents[1] / "fixtures" / "bus.dbc"
 IMU = 16

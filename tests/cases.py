@@ -43,7 +43,7 @@ from nineaudit.case import Case
 from nineaudit.engine import run
 from nineaudit.finding import Finding
 from nineaudit.provenance import Provenance
-from nineaudit.readers.assemble import assemble
+from nineaudit.readers.clocks.assemble import assemble
 from nineaudit.readers.contents import Contents
 from nineaudit.recording import Damage, Recording
 from nineaudit.rig import parse_rig, preset_text

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nineaudit.array import FloatArray
-from nineaudit.readers.assemble import assemble
+from nineaudit.readers.clocks.assemble import assemble
 from nineaudit.readers.contents import Contents
 from nineaudit.recording import Recording, Source, Trace
 from nineaudit.rig import parse_rig

@@ -13,9 +13,9 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.mcap_log import read_mcap
-from nineaudit.readers.mcap_parse import Channel
-from nineaudit.readers.mcap_records import Batch
+from nineaudit.readers.mcap.parse import Channel
+from nineaudit.readers.mcap.reader import read_mcap
+from nineaudit.readers.mcap.records import Batch
 from nineaudit.rig import Rig, parse_rig
 
 COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from nineaudit.array import FloatArray, frozen
 from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.readers import Contents, assemble
-from nineaudit.readers.clock import clock_of, in_order
+from nineaudit.readers.clocks.clock import clock_of, in_order
 from nineaudit.recording import Clock, Recording, Source, Trace
 from nineaudit.rig import parse_rig
 from nineaudit.units import G0

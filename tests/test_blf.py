@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 
 import blf_files as made
 from nineaudit.errors import RecordingError
-from nineaudit.readers.blf import read_blf
-from nineaudit.readers.can_frames import ERROR, ERROR_STATE, FD, OVERLOAD, RATE_SWITCH, REMOTE, SENT, Frames
+from nineaudit.readers.can.blf import read_blf
+from nineaudit.readers.can.frames import ERROR, ERROR_STATE, FD, OVERLOAD, RATE_SWITCH, REMOTE, SENT, Frames
 
 FD_LENGTHS = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64]
 ROW = tuple[int, int, int, int, str, bytes]
@@ -390,7 +390,7 @@ def test_a_bomb_is_not_inflated_beyond_a_limit(tmp_path: Path, monkeypatch: pyte
     """64 MiB of zeros in 64 KiB, with the limit at 1 MiB: what is before and behind it is read."""
     import tracemalloc
 
-    from nineaudit.readers import blf_inflate
+    from nineaudit.readers.can import blf_inflate
 
     monkeypatch.setattr(blf_inflate, "LARGEST", 1 << 20)
     bomb = made.container(bytes(1 << 26), stated=2**32 - 1)
@@ -591,7 +591,7 @@ def test_markers_that_state_no_origin(tmp_path: Path) -> None:
 
 def test_a_large_object_over_many_containers_is_searched_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 3 MB, in containers of 64 KiB that are handed on one by one; and one that only says that it is so large."""
-    from nineaudit.readers import blf_containers, blf_stream
+    from nineaudit.readers.can import blf_containers, blf_stream
 
     monkeypatch.setattr(blf_containers, "WINDOW", 1 << 16)
     searched = []
@@ -614,7 +614,7 @@ def test_a_wrong_size_that_ends_where_a_container_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: int
 ) -> None:
     """An object counts only once the next begins at its end, however the stream is cut; a frame is never that large."""
-    from nineaudit.readers import blf_containers
+    from nineaudit.readers.can import blf_containers
 
     monkeypatch.setattr(blf_containers, "WINDOW", 1)
     for count in range(1, 11):
@@ -631,6 +631,6 @@ def test_a_wrong_size_that_ends_where_a_container_does(
 
 
 def test_types_that_are_frames_are_the_same_everywhere() -> None:
-    from nineaudit.readers import blf_chain, blf_objects
+    from nineaudit.readers.can import blf_chain, blf_objects
 
     assert set(blf_chain.FRAMES) == set(blf_objects.TYPES)

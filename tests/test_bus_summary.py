@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from bus_logs import DBC, IMU, bus_from, log_of
 from nineaudit.bus import Identifier
 from nineaudit.can_database import EXTENDED, load_databases
-from nineaudit.readers.bus_signals import _crc8, unavailable
-from nineaudit.readers.bus_summary import bus_of
-from nineaudit.readers.can_frames import ERROR, FD, Frames, frames, joined, key_counts
+from nineaudit.readers.can.bus_signals import _crc8, unavailable
+from nineaudit.readers.can.bus_summary import bus_of
+from nineaudit.readers.can.frames import ERROR, FD, Frames, frames, joined, key_counts
 
 FRAMES = 200
 

@@ -14,8 +14,9 @@ import pytest
 from nineaudit.auditing import audit
 from nineaudit.errors import RecordingError
 from nineaudit.finding import Verdict
-from nineaudit.readers import can_log, read
-from nineaudit.readers.can_frames import ERROR, FD, REMOTE, Frames, frames
+from nineaudit.readers import read
+from nineaudit.readers.can import reader as can_log
+from nineaudit.readers.can.frames import ERROR, FD, REMOTE, Frames, frames
 from nineaudit.rig import Rig, parse_rig
 
 DBC = """VERSION ""

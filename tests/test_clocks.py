@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from nineaudit.array import FloatArray, frozen
 from nineaudit.case import Case
 from nineaudit.readers import Contents, assemble
-from nineaudit.readers.alignment import nominal_ratio, pace, skew
-from nineaudit.readers.clock import clock_of, in_order
-from nineaudit.readers.resample import resample, squared_error
+from nineaudit.readers.clocks.alignment import nominal_ratio, pace, skew
+from nineaudit.readers.clocks.clock import clock_of, in_order
+from nineaudit.readers.clocks.resample import resample, squared_error
 from nineaudit.recording import Alignment, Recording, Source, Trace
 from nineaudit.rig import parse_rig
 

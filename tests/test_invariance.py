@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from nineaudit.array import SensorArray
 from nineaudit.case import Case
 from nineaudit.diagnose import Diagnosis, Status, diagnose
-from nineaudit.readers.assemble import assemble
+from nineaudit.readers.clocks.assemble import assemble
 from nineaudit.readers.contents import Contents
 from nineaudit.recording import Recording, Source, Trace
 from nineaudit.rig import parse_rig, preset_text

@@ -20,9 +20,9 @@ from mcap.writer import IndexType, Writer
 
 from mcap_logs import COMPRESSIONS, PQ, STEP_NS, expected, of, oracle, pairs, pq, rig_of, value, write_log
 from nineaudit.errors import RecordingError
-from nineaudit.readers import mcap_chunk
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.mcap_log import read_mcap
+from nineaudit.readers.mcap import chunk as mcap_chunk
+from nineaudit.readers.mcap.reader import read_mcap
 
 
 def said(contents: Contents) -> str:

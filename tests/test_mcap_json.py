@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from mcap_logs import batch_of, pairs, rig_of
-from nineaudit.readers import mcap_json
-from nineaudit.readers.fields import MISSING, lookup
-from nineaudit.readers.mcap_columns import is_number
-from nineaudit.readers.mcap_json import Json
-from nineaudit.readers.mcap_json_arrow import by_arrow
-from nineaudit.readers.mcap_log import read_mcap
+from nineaudit.readers.mcap import json as mcap_json
+from nineaudit.readers.mcap.columns import is_number
+from nineaudit.readers.mcap.fields import MISSING, lookup
+from nineaudit.readers.mcap.json import Json
+from nineaudit.readers.mcap.json_arrow import by_arrow
+from nineaudit.readers.mcap.reader import read_mcap
 
 SEVERAL = settings(derandomize=True, max_examples=80, deadline=None)
 PATHS = ["p", "v.x", "v.y", "s.1.value", "s.0.value", "list.2"]

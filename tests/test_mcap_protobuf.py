@@ -16,10 +16,10 @@ from mcap.writer import Writer
 
 from mcap_logs import batch_of, pairs, rig_of
 from nineaudit.errors import RecordingError
-from nineaudit.readers.mcap_columns import Undecodable, is_number
-from nineaudit.readers.mcap_log import read_mcap
-from nineaudit.readers.mcap_parse import Schema
-from nineaudit.readers.mcap_protobuf import Protobuf, message_class
+from nineaudit.readers.mcap.columns import Undecodable, is_number
+from nineaudit.readers.mcap.parse import Schema
+from nineaudit.readers.mcap.protobuf import Protobuf, message_class
+from nineaudit.readers.mcap.reader import read_mcap
 
 SEVERAL = settings(derandomize=True, max_examples=60, deadline=None)
 # Numbers of FieldDescriptor.Type with the smallest and largest value.

@@ -15,11 +15,11 @@ from mcap_ros2._dynamic import generate_dynamic
 
 from mcap_logs import batch_of, pairs, rig_of
 from nineaudit.errors import RecordingError
-from nineaudit.readers.fields import leaves, lookup
-from nineaudit.readers.mcap_cdr import Ros
-from nineaudit.readers.mcap_columns import Undecodable, is_number
-from nineaudit.readers.mcap_log import read_mcap
-from nineaudit.readers.mcap_ros import message_type
+from nineaudit.readers.mcap.cdr import Ros
+from nineaudit.readers.mcap.columns import Undecodable, is_number
+from nineaudit.readers.mcap.fields import leaves, lookup
+from nineaudit.readers.mcap.reader import read_mcap
+from nineaudit.readers.mcap.ros import message_type
 
 CODES = {"float32": "f", "float64": "d", "bool": "?", "byte": "B", "uint8": "B", "int8": "b"}
 CODES |= {"int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"}

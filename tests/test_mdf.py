@@ -11,8 +11,8 @@ import pytest
 
 from nineaudit.errors import RecordingError
 from nineaudit.readers import read
-from nineaudit.readers.can_frames import key_counts
-from nineaudit.readers.mdf import read_mdf
+from nineaudit.readers.can.frames import key_counts
+from nineaudit.readers.can.mdf import read_mdf
 from nineaudit.rig import parse_rig
 
 asammdf = pytest.importorskip("asammdf")

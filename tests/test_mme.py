@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError, NineauditError, RecordingError
-from nineaudit.readers import mme_files, read
+from nineaudit.readers import read
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.mme import read_mme
+from nineaudit.readers.mme import files as mme_files
+from nineaudit.readers.mme.reader import read_mme
 from nineaudit.rig import Rig, parse_rig
 from nineaudit.writers import write_recording
 from recordings import array_rig, motion
@@ -301,7 +302,7 @@ class _Pipe:
 def test_a_bomb_is_read_to_its_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bound = 2**20
     monkeypatch.setattr(mme_files, "LARGEST", bound)
-    monkeypatch.setattr("nineaudit.readers.mme.LARGEST", bound)
+    monkeypatch.setattr("nineaudit.readers.mme.reader.LARGEST", bound)
     path = archive(tmp_path, files(p=channel(CODES[0], P) + "0.0\n" * 2**22))
     assert path.stat().st_size < 2**16
     found = read_mme(path, rig())
@@ -310,14 +311,14 @@ def test_a_bomb_is_read_to_its_bound(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_samples_are_read_in_slices_to_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nineaudit.readers.mme_channel._SLICE", 30)
+    monkeypatch.setattr("nineaudit.readers.mme.channel._SLICE", 30)
     p: list[object] = list(P)
     p[7] = "gap"
     content = files(p=channel(CODES[0], p))
     found = contents(tmp_path, content)
     same(found, np.where(P == 7.5, np.nan, P))
     assert [str(d) for d in found.damage] == ["T1.001 line 21: a sample that is no number; they are missing"]
-    monkeypatch.setattr("nineaudit.readers.mme_channel.MOST", 10)
+    monkeypatch.setattr("nineaudit.readers.mme.channel.MOST", 10)
     found = contents(tmp_path, content)
     np.testing.assert_array_equal(found.traces[1].values, Q[:10])
     assert "T1.002: more than 10 samples in a channel; the rest is not read" in map(str, found.damage)

@@ -11,8 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from nineaudit.errors import NineauditError, RecordingError
-from nineaudit.readers import parquet_table, read
-from nineaudit.readers.parquet_table import read_parquet
+from nineaudit.readers import read
+from nineaudit.readers.tables import parquet_table
+from nineaudit.readers.tables.parquet_table import read_parquet
 from nineaudit.rig import parse_rig
 from nineaudit.writers import write_recording
 from recordings import array_rig, motion

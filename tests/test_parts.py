@@ -17,7 +17,7 @@ from nineaudit.cli import app
 from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.parts import Part, files, recordings
 from nineaudit.readers import Contents, read
-from nineaudit.readers.joined import join
+from nineaudit.readers.clocks.joined import join
 from nineaudit.recording import Recording, Source, Trace
 from nineaudit.report import result_schema
 from nineaudit.rig import Rig, parse_rig

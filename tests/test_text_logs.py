@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from nineaudit.can_database import EXTENDED
 from nineaudit.errors import RecordingError
-from nineaudit.readers import text_log
-from nineaudit.readers.asc import read_asc
-from nineaudit.readers.by_python_can import read_by_python_can
-from nineaudit.readers.can_frames import ERROR, ERROR_STATE, FD, OVERLOAD, RATE_SWITCH, REMOTE, SENT, Frames
-from nineaudit.readers.candump import read_candump
+from nineaudit.readers.can import text_log
+from nineaudit.readers.can.asc import read_asc
+from nineaudit.readers.can.by_python_can import read_by_python_can
+from nineaudit.readers.can.candump import read_candump
+from nineaudit.readers.can.frames import ERROR, ERROR_STATE, FD, OVERLOAD, RATE_SWITCH, REMOTE, SENT, Frames
 
 SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 LAWS = settings(

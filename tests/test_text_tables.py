@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nineaudit.errors import NineauditError, RecordingError
-from nineaudit.readers import read, text_blocks
+from nineaudit.readers import read
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.csv_table import read_text_table
+from nineaudit.readers.tables import text_blocks
+from nineaudit.readers.tables.csv_table import read_text_table
 from nineaudit.rig import Rig, parse_rig
 
 SMALL = '[rig]\nname="s"\n[units]\nacceleration="m/s^2"\n{recording}' + "".join(

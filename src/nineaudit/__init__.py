@@ -9,7 +9,7 @@ Frames. Everything is in the body frame: origin and axes are those in which the 
 SAE J1733 (x forward, y right, z down) for a head. Rotations and rates are right-handed.
 
 Units. SI inside: m, m/s², rad/s, rad/s², s. The rig file and the recording have their own; they are converted once on
-reading (rig.py, readers/assemble.py) and once on writing (writers, report). g_0 is 9.80665 m/s².
+reading (rig.py, readers/clocks/assemble.py) and once on writing (writers, report). g_0 is 9.80665 m/s².
 
 Symbols, and their names in the code:
 

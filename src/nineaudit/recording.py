@@ -49,7 +49,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Alignment:
-    """How a channel that was sampled by another clock came onto the common time base (readers/alignment.py).
+    """How a channel that was sampled by another clock came onto the common time base (readers/clocks/alignment.py).
 
     `rate` Hz; `ratio` (p, q): p of its samples to q of the base's, the nominal ratio of the rates; `drift` (1) by how
     much faster than that it runs, as the stamps tell, and its standard uncertainty `u_drift`. `skew` s: how long after

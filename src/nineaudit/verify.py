@@ -15,7 +15,7 @@ from nineaudit.files import is_sealed
 from nineaudit.provenance import SCHEMA as REPAIR
 from nineaudit.provenance import chain, parse, path_beside
 from nineaudit.readers import READERS, fingerprint
-from nineaudit.readers.mcap_rebuilt import record_in
+from nineaudit.readers.mcap.rebuilt import record_in
 
 RESULT: Final = "nineaudit/result/1"
 UNCHANGED, CHANGED, UNKNOWN = 0, 1, 3

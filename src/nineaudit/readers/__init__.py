@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Final
 from nineaudit.errors import RecordingError
 from nineaudit.parts import in_order, part_of
 from nineaudit.provenance import Provenance, beside, path_beside
-from nineaudit.readers import mme_files
-from nineaudit.readers.assemble import assemble
-from nineaudit.readers.can_log import read_can
+from nineaudit.readers.can.mdf_signals import read_mf4
+from nineaudit.readers.can.reader import read_can
+from nineaudit.readers.clocks.assemble import assemble
+from nineaudit.readers.clocks.joined import join
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.csv_table import read_text_table
-from nineaudit.readers.joined import join
-from nineaudit.readers.mcap_rebuilt import read_repaired
-from nineaudit.readers.mdf_signals import read_mf4
-from nineaudit.readers.mme import read_mme
-from nineaudit.readers.parquet_table import read_parquet
+from nineaudit.readers.mcap.rebuilt import read_repaired
+from nineaudit.readers.mme import files as mme_files
+from nineaudit.readers.mme.reader import read_mme
+from nineaudit.readers.tables.csv_table import read_text_table
+from nineaudit.readers.tables.parquet_table import read_parquet
 from nineaudit.recording import Damage, Recording, Source
 from nineaudit.signals import suggestion
 

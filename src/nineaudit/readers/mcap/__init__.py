@@ -1,0 +1,1 @@
+"""MCAP logs: records, damage, and messages of every encoding as columns."""

@@ -1,0 +1,1 @@
+"""Tables: text in any dialect, and Parquet."""
