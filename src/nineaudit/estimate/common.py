@@ -79,7 +79,9 @@ class Try:
 def mostly_explained(healthy: Fit, best: Hypothesis) -> bool:
     """Whether a hypothesis leaves so little of what is wrong with the record, over the noise that its channels have at
     rest, that no common cause is to be looked for. Never, where nothing is known of that noise, or where it is far more
-    than the rig says, as in another unit."""
+    than the rig says, as in another unit; nor of two free channels, which imitate a reversed axis."""
+    if len(best.channels) > 1 and best.word != "swap":
+        return False
     weighted = _at_rest(healthy.data)[:, healthy.data.used]
     if len(weighted) < FEWEST:
         return False
