@@ -152,7 +152,9 @@ def _filtered(case: Case, class_: float | None) -> tuple[Case, list[str]]:
     """The case through a class, if one is wanted, and what is to be said of filters."""
     from nineaudit.case import Case
     from nineaudit.filtering import filtered, note
+    from nineaudit.schemes.requirements import require_readings
 
+    require_readings(case.array, case.recording.readings)
     said = note(case)
     if class_ is None:
         return case, [said or "no filter is stated or seen: peaks and injury values are those of unfiltered readings"]
