@@ -216,6 +216,7 @@ def test_an_original_that_is_gone_cannot_vouch(here: Audit) -> None:
 
 STOPPED = """
 import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts its background jobs deaf to it
 import nineaudit.repair, nineaudit.writers, nineaudit.files
 from nineaudit import cli
 def stop(*_):

@@ -48,7 +48,8 @@ def write_mme(recording: Recording, readings: FloatArray, path: Path, _: Sequenc
     """The test as a .mme file and the folder Channel beside it. ConfigurationError where there is one already."""
     folder = path.parent / "Channel"
     if folder.exists():
-        raise ConfigurationError("the folder exists already", file=folder, advice="choose a folder of its own")
+        advice = "remove it, or choose a folder of its own"
+        raise ConfigurationError("the folder exists already", file=folder, advice=advice)
     partial = path.parent / f".Channel.{os.getpid()}"
 
     def put(name: str, text: str) -> None:
