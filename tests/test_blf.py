@@ -634,3 +634,19 @@ def test_types_that_are_frames_are_the_same_everywhere() -> None:
     from nineaudit.readers.can import blf_chain, blf_objects
 
     assert set(blf_chain.FRAMES) == set(blf_objects.TYPES)
+
+
+@pytest.mark.parametrize(("year", "day"), [(9000, 1), (2262, 12), (1600, 1), (1969, 31)])
+def test_a_start_that_no_measurement_has_is_no_date(tmp_path: Path, year: int, day: int) -> None:
+    """Found by fuzzing: nanoseconds since 1970 of the year 9000 do not fit 64 bits."""
+    path = tmp_path / "log.blf"
+    with can.BLFWriter(path) as out:
+        for i in range(3):
+            out.on_message_received(can.Message(timestamp=1.7e9 + i, arbitration_id=5, data=[i]))
+    data = bytearray(path.read_bytes())
+    data[40:56] = struct.pack("<8H", year, 1, 0, day, 0, 0, 0, 0)
+    path.write_bytes(data)
+    log = read_blf(path)
+    assert np.diff(log.time).tolist() == [10**9, 10**9]
+    assert log.time[0] < 10**9
+    assert [x.place for x in log.damage] == ["byte 40"]

@@ -58,6 +58,10 @@ def read_header(file: BinaryIO, path: Path) -> Header:
     return Header(size, file_size, inflated, objects, _start(start))
 
 
+_YEARS = (1970, 2200)
+"""Years that a measurement may have: in 2262 nanoseconds since 1970 no longer fit 64 bits."""
+
+
 def _start(date: list[int]) -> int | None:
     """ns since 1970 of a SYSTEMTIME, read as UTC as python-can does, so that it is the same wherever it is read."""
     year, month, _, day, hour, minute, second, millisecond = date
@@ -66,6 +70,8 @@ def _start(date: list[int]) -> int | None:
     try:
         moment = datetime.datetime(year, month, day, hour, minute, second, millisecond * 1000, tzinfo=datetime.UTC)
     except ValueError:
+        return None
+    if not _YEARS[0] <= year <= _YEARS[1]:
         return None
     return (moment - _EPOCH) // datetime.timedelta(microseconds=1) * 1000
 
