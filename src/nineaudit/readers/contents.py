@@ -33,12 +33,3 @@ def cut_short(path: Path, why: str, what_was_read: str, *, place: str | None = N
         place=place,
         advice=f"{what_was_read} could be read; record or copy the file again",
     )
-
-
-def span(count: int, noun: str, first: float, last: float) -> str:
-    """ "53800 frames, 0 s to 60 s" for what could be read before the damage."""
-    if count == 0:
-        return f"no {noun}s"
-    origin = first if first > 1e6 else 0.0
-    stamps = f"{first - origin:.6g} s to {last - origin:.6g} s"
-    return f"{count} {noun}{'s' if count != 1 else ''} ({stamps}{' after the first' if origin else ''})"

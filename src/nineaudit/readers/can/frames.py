@@ -69,7 +69,8 @@ class Frames:
 
     def rows_of(self, key: int) -> Rows:
         """Rows of the data frames of an identifier, in the order of the log."""
-        return np.flatnonzero((self.key == np.uint32(key)) & self.is_data)
+        rows = np.flatnonzero(self.key == np.uint32(key))
+        return np.asarray(rows[(self.kind[rows] & NOT_DATA) == 0])
 
     def payload(self, rows: Rows) -> ByteMatrix:
         """(len(rows), 8 or 64) bytes of frames, zero-filled: 64 only where one of them has more than 8."""
