@@ -20,8 +20,22 @@ import typer
 
 from nineaudit import compare_command, motion_command, plain_text, progress, verify_command
 from nineaudit.calibrate import calibrate_app
+from nineaudit.campaign.commands import campaign_app
 from nineaudit.errors import NineauditError
-from nineaudit.options import Dbc, Force, Log, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
+from nineaudit.options import (
+    Dbc,
+    Force,
+    Log,
+    Output,
+    Recording,
+    Recordings,
+    RigFile,
+    RigOption,
+    Rules,
+    TestOption,
+    example,
+    group,
+)
 from nineaudit.reference import rig_app, rules_app
 
 DEFECT = 70
@@ -80,14 +94,17 @@ def check(
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="F", help="Write JUnit XML.")] = None,
     summary: Annotated[Path | None, typer.Option(metavar="F.md", help="Write a summary in Markdown.")] = None,
+    test: TestOption = None,
     log: Log = None,
 ) -> None:
     """Audit recordings: which rules hold, which channel is at fault, what that does to the results."""
     from nineaudit import checking, logging_runs
+    from nineaudit.identity import from_options
     from nineaudit.parts import recordings as each_recording
     from nineaudit.rig import load_rig
     from nineaudit.waivers import load_waivers
 
+    about = from_options(test or ())
     instrument, book = load_rig(rig), checking.load_book(rules, select, ignore)
     accepted = None if waivers is None else load_waivers(waivers, checking.load_book(rules).codes)
     originals = [file for recording in recordings for file in instrument.files(recording)]
@@ -95,7 +112,7 @@ def check(
     recordings = list(each_recording(recordings, instrument.parts))
     logging_runs.protect_log(log, inputs)
     files = checking.files(recordings, (*inputs, log), html=html, json=json, junit=junit, summary=summary)
-    outcomes = checking.audit_each(recordings, instrument, book, accepted, dbc or (), context.obj or ())
+    outcomes = checking.audit_each(recordings, instrument, book, accepted, dbc or (), context.obj or (), about)
     used = [rig, *([waivers] if waivers else []), *(dbc or instrument.dbc)]
     noted = logging_runs.Run(log, context.obj or (), used, fail_on) if log else None
     each: Iterable[checking.Outcome] = noted.watch(outcomes) if noted else outcomes
@@ -246,7 +263,12 @@ app.command("motion", epilog=motion_command.EXAMPLE)(_printing(motion_command.mo
 app.command("compare", epilog=compare_command.EXAMPLE)(_printing(compare_command.compare))
 app.command("verify", epilog=verify_command.EXAMPLE)(_printing(verify_command.verify))
 
-for name, reference in (("rules", rules_app), ("rig", rig_app), ("calibrate", calibrate_app)):
+for name, reference in (
+    ("rules", rules_app),
+    ("rig", rig_app),
+    ("calibrate", calibrate_app),
+    ("campaign", campaign_app),
+):
     app.add_typer(reference, name=name, result_callback=typer.echo)
 
 
