@@ -7,6 +7,7 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import IO
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -371,7 +372,9 @@ def test_what_is_written_is_the_same_each_time_and_reads_back(tmp_path: Path) ->
         assert {n: packed.read(n) for n in packed.namelist()} == {
             p.relative_to(tmp_path / "b").as_posix(): p.read_bytes() for p in (tmp_path / "b").rglob("*") if p.is_file()
         }
-    with pytest.raises(ConfigurationError, match=r"Channel: the folder exists already"):
+    with pytest.raises(
+        ConfigurationError, match=r"Channel: the folder exists already, with files of another test; found 'A.001'"
+    ):
         write_recording(MOTION, tmp_path / "b" / "B.mme")
     assert not (tmp_path / "b" / "B.mme").exists()
 
@@ -422,3 +425,51 @@ def test_what_was_rebuilt_is_said_in_its_channel(tmp_path: Path) -> None:
         mended, other = (packed.read(f"Channel/R.{i:03d}").decode() for i in (4, 3))
     assert "Comments                    :4 samples rebuilt by nineaudit; the original is not altered" in mended
     assert "Comments" not in other
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize("name", ["A.mme", "A.zip"])
+def test_an_older_test_is_replaced_when_asked_for_and_only_by_a_whole_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    path = tmp_path / name
+    write_recording(replace(MOTION, readings=MOTION.readings + 1.0), path)
+    (tmp_path / "kept.txt").write_text("kept", encoding="utf-8")
+    before = files_of(tmp_path)
+    with pytest.raises(ConfigurationError, match="exists already"):
+        write_recording(MOTION, path)
+    with monkeypatch.context() as broken:  # the disk is full when the last file takes its name
+        broken.setattr("nineaudit.files.os.replace", Mock(side_effect=OSError(28, "No space left on device")))
+        with pytest.raises(ConfigurationError, match="cannot be written: No space left on device"):
+            write_recording(MOTION, path, force=True)
+    assert files_of(tmp_path) == before
+    assert not [p.name for p in tmp_path.iterdir() if p.name.startswith(".")]
+    write_recording(MOTION, path, force=True)
+    np.testing.assert_allclose(read(path, ARRAY_RIG).readings, MOTION.readings, rtol=2.3e-16)
+    assert files_of(tmp_path).keys() == before.keys()
+    assert not [p.name for p in tmp_path.iterdir() if p.name.startswith(".")]
+
+
+def test_force_takes_nothing_of_another_test_nor_of_the_original(tmp_path: Path) -> None:
+    write_recording(MOTION, tmp_path / "A.mme")
+    before = files_of(tmp_path)
+    original = read(tmp_path, ARRAY_RIG)
+    for path, says in [
+        (tmp_path / "A.mme", "the original recording is never overwritten"),
+        (tmp_path / "B.mme", "the original recording is never overwritten"),
+    ]:
+        with pytest.raises(ConfigurationError, match=says):
+            write_recording(original, path, force=True)
+    with pytest.raises(ConfigurationError, match=r"with files of another test; found 'A\.001'"):
+        write_recording(MOTION, tmp_path / "B.mme", force=True)
+    with pytest.raises(ConfigurationError, match="the original recording is never overwritten"):
+        write_recording(read(tmp_path / "A.mme", ARRAY_RIG), tmp_path / "A.mme", force=True)
+    assert files_of(tmp_path) == before
+    loose = tmp_path / "loose"
+    loose.mkdir()
+    (loose / "c.001").write_bytes(b"")
+    with pytest.raises(ConfigurationError, match=r"c\.001: it is a channel of a test of this name"):
+        write_recording(MOTION, loose / "C.mme", force=True)

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -198,6 +199,23 @@ def test_with_force_what_was_there_comes_back_when_the_run_fails(
     assert output.read_text(encoding="utf-8") == "precious"
     assert path_beside(output).read_text(encoding="utf-8") == "its record"
     assert names() == before
+
+
+def test_an_older_mme_test_is_replaced_with_its_record_or_both_stay(
+    here: Audit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    repair.repair(here, Path("new.mme"), reason="first", now=NOW)
+    kept = {p: p.read_bytes() for p in [Path("new.mme"), path_beside(Path("new.mme")), *Path("Channel").iterdir()]}
+    with monkeypatch.context() as broken:
+        broken.setattr("nineaudit.repair.write_whole", Mock(side_effect=OSError(28, "No space left on device")))
+        with pytest.raises(ConfigurationError, match="No space"):
+            repair.repair(here, Path("new.mme"), force=True, now=NOW)
+    assert {p: p.read_bytes() for p in kept} == kept
+    Path("Channel/new.001").write_text("altered", encoding="utf-8")
+    place = repair.repair(here, Path("new.mme"), reason="second", force=True, now=NOW)
+    assert json.loads(place.read_text(encoding="utf-8"))["reason"] == "second"
+    assert [answer.state for answer in verify.verify([Path("new.mme")])] == [0, 0, 0]
+    assert not [name for name in names() if name.startswith(".")]
 
 
 def test_without_force_neither_file_is_overwritten(here: Audit) -> None:

@@ -63,14 +63,11 @@ def repair(
     def make(unnamed: Path) -> Outcome:
         outcome = _written(audit, rebuilt, unnamed, dbc, document)
         _require_unchanged(audit.recording)
-        if output.suffix.lower() != ".mme":
-            _record(beside, document, output.name, unnamed)
+        _record(beside, document, output.name, unnamed)
         return outcome
 
     with _kept(beside):
         place(output, audit.recording, make, force=force)
-        if output.suffix.lower() == ".mme":  # the names of its files are in its hash
-            _record(beside, document, output.name, output)
     return beside
 
 

@@ -6,8 +6,8 @@ of the recording it comes from.
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -23,6 +23,7 @@ from nineaudit.writers.can_file import write_asc, write_blf
 from nineaudit.writers.dbc import make_dbc
 from nineaudit.writers.mcap_file import write_mcap
 from nineaudit.writers.mme_file import write_mme, write_mme_zip
+from nineaudit.writers.mme_place import folder_of_test, require_test_free, settle_test
 from nineaudit.writers.outcome import Outcome
 from nineaudit.writers.table_file import write_csv, write_parquet
 
@@ -95,20 +96,28 @@ def place(path: Path, recording: Recording, make: Callable[[Path], Outcome], *, 
 
     ConfigurationError: as write_recording.
     """
-    _writer(path)
-    _require_free(path, [source.path for source in recording.source.files], force)
-    partial, outcome, whole = partial_name(path), Outcome(), False
+    several = _writer(path) is write_mme
+    sources = [source.path for source in recording.source.files]
     try:
-        outcome = make(partial)
-        settle(partial, path)
-        whole = True
+        _require_free(path, sources, force)
+        if several:
+            require_test_free(path, sources, force)
+        with folder_of_test(path) if several else _one_file(path) as partial:
+            outcome = make(partial)
+            (settle_test if several else settle)(partial, path)
     except OSError as error:
         raise ConfigurationError(f"cannot be written: {error.strerror or error}", file=path) from error
+    return Written(path, outcome.error, outcome.notes)
+
+
+@contextmanager
+def _one_file(path: Path) -> Iterator[Path]:
+    """Where a file is written before it takes its name."""
+    partial = partial_name(path)
+    try:
+        yield partial
     finally:
         partial.unlink(missing_ok=True)
-        for folder in () if whole else outcome.folders:
-            shutil.rmtree(folder, ignore_errors=True)
-    return Written(path, outcome.error, outcome.notes)
 
 
 def _writer(path: Path) -> Writer:

@@ -3,21 +3,18 @@ folder Channel beside it. Readings that are not valid are NOVALUE."""
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 import zipfile
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from nineaudit.array import FloatArray, Sensor
-from nineaudit.errors import ConfigurationError
 from nineaudit.recording import Recording
 from nineaudit.signals import in_unit
+from nineaudit.writers.mme_place import CHANNEL
 from nineaudit.writers.outcome import Outcome
 
 _CODE: Final = re.compile(r"[0-9A-Z?]{16}")
@@ -45,24 +42,13 @@ def write_mme_zip(recording: Recording, readings: FloatArray, path: Path, _: Seq
 
 
 def write_mme(recording: Recording, readings: FloatArray, path: Path, _: Sequence[Path]) -> Outcome:
-    """The test as a .mme file and the folder Channel beside it. ConfigurationError where there is one already."""
-    folder = path.parent / "Channel"
-    if folder.exists():
-        advice = "remove it, or choose a folder of its own"
-        raise ConfigurationError("the folder exists already", file=folder, advice=advice)
-    partial = path.parent / f".Channel.{os.getpid()}"
+    """The test as a .mme file and the folder Channel beside it, neither of which is there yet."""
+    (path.parent / CHANNEL).mkdir()
 
     def put(name: str, text: str) -> None:
-        place = path if "/" not in name else partial / name.rpartition("/")[2]
-        place.write_text(text, encoding="utf-8", newline="\n")
+        (path.parent / name).write_text(text, encoding="utf-8", newline="\n")
 
-    partial.mkdir()
-    try:
-        outcome = _write(recording, readings, _stem(path), put, path.name)
-        partial.rename(folder)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
-    return replace(outcome, folders=(folder,))
+    return _write(recording, readings, path.stem, put, path.name)
 
 
 def _stem(path: Path) -> str:
@@ -78,11 +64,11 @@ def _write(recording: Recording, readings: FloatArray, stem: str, put: Put, head
     if "Reference channel name" in clock:
         channels.append((_time_header(recording), recording.time))
     for i, (keys, values) in enumerate(channels, 1):
-        put(f"Channel/{stem}.{i:03d}", _text(keys) + "".join(f"{_cell(value)}\n" for value in values.tolist()))
+        put(f"{CHANNEL}/{stem}.{i:03d}", _text(keys) + "".join(f"{_cell(value)}\n" for value in values.tolist()))
     index = {"Number of channels": str(len(channels))}
     for i, (keys, _) in enumerate(channels, 1):
         index[f"Name of channel {i:03d}"] = f"{keys['Channel code']} / {keys['Name of the channel']}"
-    put(f"Channel/{stem}.chn", _text(index))
+    put(f"{CHANNEL}/{stem}.chn", _text(index))
     put(header, _text(_test(recording, stem)))
     made_up = [s.channel for s in recording.rig.array.sensors if not _CODE.fullmatch(s.signal)]
     note = f"channel codes made up, for the rig names none: {', '.join(made_up)}"
