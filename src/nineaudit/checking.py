@@ -14,6 +14,7 @@ from nineaudit.outputs import each_its_own, make_folder, places, protect, unwrit
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
+    from nineaudit.identity import Stated
     from nineaudit.rig import Rig
     from nineaudit.rulebook import Rulebook
     from nineaudit.waivers import Waiver
@@ -117,10 +118,12 @@ def audit_each(
     waivers: Sequence[Waiver] | None = None,
     dbc: Sequence[Path] = (),
     command: Sequence[str] = (),
+    test: Sequence[Stated] = (),
 ) -> Iterator[Outcome]:
     """Audit one recording after the other. One that cannot be audited is an Outcome with its error and does not
     stop the others; a ConfigurationError does, for it would come again with each of them. Waivers that match none
-    of the recordings are findings of the first that is audited. `command`: the arguments of the run, for the report."""
+    of the recordings are findings of the first that is audited. `command`: the arguments of the run, for the report;
+    `test`: what was stated of the test there."""
     from nineaudit.auditing import audit
     from nineaudit.readers import read
     from nineaudit.waivers import unmatched
@@ -129,7 +132,7 @@ def audit_each(
     lost = unmatched(waivers, paths)
     for path in paths:
         try:
-            done = audit(read(path, rig, dbc=dbc), rulebook, waivers=waivers)
+            done = audit(read(path, rig, dbc=dbc, test=test), rulebook, waivers=waivers)
             done = replace(done, command=shlex.join(["nineaudit", *command]) if command else "")
             yield Outcome(path, audit=_with_unmatched(done, lost))
             lost = ()

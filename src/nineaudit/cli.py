@@ -18,24 +18,11 @@ from typing import Annotated, NoReturn, ParamSpec
 
 import typer
 
-from nineaudit import compare_command, motion_command, plain_text, progress, verify_command
+from nineaudit import compare_command, motion_command, options, plain_text, progress, verify_command
 from nineaudit.calibrate import calibrate_app
 from nineaudit.campaign.commands import campaign_app
 from nineaudit.errors import NineauditError
-from nineaudit.options import (
-    Dbc,
-    Force,
-    Log,
-    Output,
-    Recording,
-    Recordings,
-    RigFile,
-    RigOption,
-    Rules,
-    TestOption,
-    example,
-    group,
-)
+from nineaudit.options import Dbc, Force, Log, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
 from nineaudit.reference import rig_app, rules_app
 
 DEFECT = 70
@@ -94,7 +81,7 @@ def check(
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="F", help="Write JUnit XML.")] = None,
     summary: Annotated[Path | None, typer.Option(metavar="F.md", help="Write a summary in Markdown.")] = None,
-    test: TestOption = None,
+    test: options.TestOption = None,
     log: Log = None,
 ) -> None:
     """Audit recordings: which rules hold, which channel is at fault, what that does to the results."""

@@ -31,6 +31,15 @@ Dbc = Annotated[
     list[Path] | None,
     typer.Option("--dbc", metavar="F", help="CAN database in place of the rig's; may be repeated."),
 ]
+TestOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--test",
+        metavar="KEY=VALUE",
+        help="About the test: number, title, item, item_serial, date (YYYY-MM-DD), laboratory, customer, notes; may be "
+        "repeated. Overrides rig file and recording.",
+    ),
+]
 Rules = Annotated[
     Path | None, typer.Option("--rules", metavar="DIR", help="Folder of rule sheets to add, or to put in place.")
 ]

@@ -12,6 +12,7 @@ import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.bus import Bus
+from nineaudit.identity import Identity, Stated
 from nineaudit.provenance import Provenance, Remade
 from nineaudit.rig import Rig
 
@@ -97,7 +98,7 @@ class Source:
     """The file that was read. `counts`: what its container held (frames, error frames, ...); `notes`: in words;
     `damage`: what of it could not be read. `parts`: every file, where the recording has several; `path`, `sha256` and
     `size` are then those of the first. `provenance`: the record that says which readings are made, not measured; None
-    where there is none."""
+    where there is none. `stated`: what it says of the test."""
 
     path: Path
     format: str
@@ -109,6 +110,7 @@ class Source:
     damage: tuple[Damage, ...] = ()
     parts: tuple[Source, ...] = ()
     provenance: Provenance | None = None
+    stated: tuple[Stated, ...] = ()
 
     @property
     def files(self) -> tuple[Source, ...]:
@@ -123,7 +125,8 @@ class Recording:
     Columns follow ``rig.array``. Invalid readings are NaN. `native` are the traces in SI on their own clocks
     (the same arrays where the clocks agree), for checks that must see samples as they were taken; `resampled`
     names the channels whose readings were interpolated onto the common time base, `alignments` how. `rig` is the rig
-    as it was in this recording: its file's, with the timing uncertainty of the alignment added.
+    as it was in this recording: its file's, with the timing uncertainty of the alignment added. `test`: which test
+    it is of.
     """
 
     time: FloatArray
@@ -136,6 +139,7 @@ class Recording:
     resampled: tuple[str, ...] = ()
     bus: Bus | None = None
     alignments: tuple[Alignment, ...] = ()
+    test: Identity = field(default_factory=Identity)
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray, Kind, SensorArray, frozen
 from nineaudit.errors import ConfigurationError
+from nineaudit.identity import Stated, stated
 from nineaudit.parts import NAME, Part, files, in_one_file
 from nineaudit.presets import PRESETS, preset_text
 from nineaudit.units import factor
@@ -52,8 +53,8 @@ class Rig:
 
     `pre_trigger` (start, end) in s, the body at rest. `dbc` resolved against the rig file. `time_unit` None:
     by the suffix of the time column. `separator` and `decimal` of CSV, None where they are to be detected.
-    `parts`: the files of a recording, where it has several. `sha256` of the file's bytes (of the text where there is no
-    file); `text` as it was read.
+    `parts`: the files of a recording, where it has several. `test`: what all recordings have in common. `sha256` of the
+    file's bytes (of the text where there is no file); `text` as it was read.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Rig:
     separator: str | None = None
     decimal: str | None = None
     parts: tuple[Part, ...] = ()
+    test: tuple[Stated, ...] = ()
 
     def files(self, recording: Path) -> tuple[Path, ...]:
         """All files of the recording that a path names."""
@@ -141,6 +143,7 @@ def parse_rig(text: str, path: Path | None = None) -> Rig:
         separator=recording.separator,
         decimal=recording.decimal,
         parts=_parts(tables, array, path),
+        test=_test(tables, path),
     )
 
 
@@ -170,6 +173,12 @@ def _databases(names: Iterable[str], path: Path | None) -> tuple[Path, ...]:
                 expected=f"a file relative to {folder.absolute()}",
             )
     return found
+
+
+def _test(tables: RigFile, path: Path | None) -> tuple[Stated, ...]:
+    """What the table [test] states."""
+    values = tables.test.model_dump(exclude_none=True)
+    return stated({key: str(value) for key, value in values.items()}, f"rig file {path.name}" if path else "rig file")
 
 
 def _parts(tables: RigFile, array: SensorArray, path: Path | None) -> tuple[Part, ...]:

@@ -20,6 +20,7 @@ from nineaudit.rig_schema import (
     RigFile,
     RigTable,
     SensorTable,
+    TestTable,
     UncertaintyTable,
     UnitsTable,
 )
@@ -28,6 +29,7 @@ _TABLES: Mapping[str, type[BaseModel]] = {
     "rig": RigTable,
     "units": UnitsTable,
     "recording": RecordingTable,
+    "test": TestTable,
     "uncertainty": UncertaintyTable,
     "sensor": SensorTable,
     "point": PointTable,

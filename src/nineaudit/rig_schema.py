@@ -6,99 +6,26 @@ pydantic is slow to load.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
-from pydantic_core import PydanticCustomError
 
-from nineaudit.errors import ConfigurationError
-from nineaudit.presets import PRESETS, nearest
-from nineaudit.units import FACTORS, Quantity, factor
-
-FILTER_CLASSES = ("none", "CFC60", "CFC180", "CFC600", "CFC1000")
-UNIT_NAMES: dict[Quantity, tuple[str, ...]] = {
-    "length": tuple(FACTORS["length"]),
-    "acceleration": (*FACTORS["acceleration"], "mV"),
-    "angular_rate": (*FACTORS["angular_rate"], "mV"),
-    "time": tuple(FACTORS["time"]),
-}
-
-
-def _canonical(value: str, quantity: Quantity) -> str | None:
-    """The file's name of a unit that was spelled another way (``g``, ``m/s²``), or None."""
-    try:
-        size = factor(value, quantity)
-    except ConfigurationError:
-        return nearest(value, UNIT_NAMES[quantity])
-    return next(name for name, known in FACTORS[quantity].items() if known == size)
-
-
-def _unit(quantity: Quantity) -> Callable[[str], str]:
-    def check(value: str) -> str:
-        if value not in UNIT_NAMES[quantity]:
-            close = _canonical(value, quantity)
-            raise PydanticCustomError(
-                "unit",
-                "one of {names}",
-                {
-                    "names": ", ".join(UNIT_NAMES[quantity]),
-                    "advice": f"did you mean {close!r}?" if close else "",
-                },
-            )
-        return value
-
-    return check
-
-
-def _filter_class(value: str) -> str:
-    for name in FILTER_CLASSES:
-        if value.lower() == name.lower():
-            return name
-    raise PydanticCustomError("filter_class", "one of {names}", {"names": ", ".join(FILTER_CLASSES)})
-
-
-def _ordered(value: list[float]) -> list[float]:
-    if not value[0] < value[1]:
-        raise PydanticCustomError("order", "[start, end] in seconds with start before end")
-    return value
-
-
-def _direction(value: list[float]) -> list[float]:
-    if not any(value):
-        raise PydanticCustomError("direction", "a vector of non-zero length")
-    return value
-
-
-def _names(*names: str) -> dict[str, Any]:
-    return {"enum": list(names)}
-
-
-Text = Annotated[str, Field(min_length=1, pattern=r"^\S(.*\S)?$")]
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-Deviation = Annotated[float, Field(ge=0)]
-Positive = Annotated[float, Field(gt=0)]
-LengthUnit = Annotated[str, AfterValidator(_unit("length")), Field(json_schema_extra=_names(*UNIT_NAMES["length"]))]
-AccelerationUnit = Annotated[
-    str, AfterValidator(_unit("acceleration")), Field(json_schema_extra=_names(*UNIT_NAMES["acceleration"]))
-]
-RateUnit = Annotated[
-    str, AfterValidator(_unit("angular_rate")), Field(json_schema_extra=_names(*UNIT_NAMES["angular_rate"]))
-]
-TimeUnit = Annotated[str, AfterValidator(_unit("time")), Field(json_schema_extra=_names(*UNIT_NAMES["time"]))]
-# Case does not matter on load; the first alternative is what editors offer.
-FilterClass = Annotated[
-    str,
-    AfterValidator(_filter_class),
-    Field(
-        json_schema_extra={
-            "anyOf": [
-                _names(*FILTER_CLASSES),
-                {"pattern": "^([Nn][Oo][Nn][Ee]|[Cc][Ff][Cc](60|180|600|1000))$"},
-            ]
-        }
-    ),
-]
+from nineaudit.presets import PRESETS
+from nineaudit.rig_fields import (
+    AccelerationUnit,
+    Day,
+    Deviation,
+    FilterClass,
+    LengthUnit,
+    Positive,
+    RateUnit,
+    Text,
+    TimeUnit,
+    Vector,
+    direction,
+    names,
+    ordered,
+)  # fmt: skip
 
 
 class Table(BaseModel):
@@ -115,7 +42,7 @@ class RigTable(Table):
     model_config = ConfigDict(json_schema_extra={"dependentRequired": {"arms": ["preset"]}})
     name: Text | None = None
     """Name shown in reports. Default: the preset's title, or the file's name."""
-    preset: Annotated[str, Field(json_schema_extra=_names(*PRESETS))] | None = None
+    preset: Annotated[str, Field(json_schema_extra=names(*PRESETS))] | None = None
     """A published layout that fills in the sensors; a [[sensor]] table of the same channel overrides it."""
     arms: list[float] | None = None
     """Arm lengths of the preset, in the length unit, along x, y, z as it has them. Default: 50 mm."""
@@ -141,7 +68,7 @@ class RecordingTable(Table):
     """Unit of the time column. Default: from the suffix of its name (time_ms), else s."""
     dbc: list[Text] = []
     """CAN databases (.dbc, .arxml, .kcd), relative to this file."""
-    pre_trigger: Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)] | None = None
+    pre_trigger: Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(ordered)] | None = None
     """Interval [start, end] in s, body at rest: zero offset, noise, omega(0) = 0. Default: looked for."""
     filter_class: FilterClass = "none"
     """Channel frequency class of the readings as recorded; none if unfiltered. Default: none."""
@@ -149,6 +76,27 @@ class RecordingTable(Table):
     """CSV: the field separator, one character. Default: detected."""
     decimal: Literal[".", ","] | None = None
     """CSV: the decimal mark. Default: detected."""
+
+
+class TestTable(Table):
+    """What all recordings of this rig have in common as tests. A recording's own header, and --test, override it."""
+
+    number: Text | None = None
+    """Number of the test."""
+    title: Text | None = None
+    """Title of the test."""
+    item: Text | None = None
+    """What is tested."""
+    item_serial: Text | None = None
+    """Serial number of the item."""
+    date: Day | None = None
+    """Date of the test, YYYY-MM-DD."""
+    laboratory: Text | None = None
+    """Laboratory that makes the test."""
+    customer: Text | None = None
+    """For whom it is made."""
+    notes: Text | None = None
+    """Anything else that the report is to say of the test."""
 
 
 class UncertaintyTable(Table):
@@ -185,7 +133,7 @@ class SensorTable(Table):
     """Either accelerometer or gyroscope."""
     position: Vector | None = None
     """Position in the body frame, in the length unit. Needed for accelerometers; else without effect."""
-    axis: Annotated[Vector, AfterValidator(_direction)] | None = None
+    axis: Annotated[Vector, AfterValidator(direction)] | None = None
     """Sensitive axis in the body frame; any length but zero, normalised on load."""
     range: Positive | None = None
     """Full scale, in the sensor's unit: where clipping is expected."""
@@ -267,6 +215,7 @@ class RigFile(Table):
     rig: RigTable = RigTable()
     units: UnitsTable = UnitsTable()
     recording: RecordingTable = RecordingTable()
+    test: TestTable = TestTable()
     uncertainty: UncertaintyTable = UncertaintyTable()
     sensor: list[SensorTable] = []
     """The channels, in the order of the array."""

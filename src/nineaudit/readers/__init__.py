@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from nineaudit.errors import RecordingError
+from nineaudit.identity import Stated, identify
 from nineaudit.parts import in_order, part_of
 from nineaudit.provenance import Provenance, beside, path_beside
 from nineaudit.readers.can.mdf_signals import read_mf4
@@ -80,21 +81,30 @@ READERS: Final[Mapping[str, Reader]] = {
 """Reader of each suffix (lower case)."""
 
 
-def read(path: str | Path | Sequence[str | Path], rig: Rig, *, dbc: Sequence[str | Path] = ()) -> Recording:
+def read(
+    path: str | Path | Sequence[str | Path],
+    rig: Rig,
+    *,
+    dbc: Sequence[str | Path] = (),
+    test: Sequence[Stated] = (),
+) -> Recording:
     """Read a recording of a rig: (n,) s and (n,k) SI readings on one time base, and the traces as recorded.
 
     Of a recording of several files (the rig's parts) `path` is any one of them, or all in a list. `dbc` takes the place
-    of the rig's CAN databases. Raises RecordingError (exit code 3) for a file that cannot be read, is truncated, or
-    lacks a channel; ConfigurationError (2) for databases, units and parts.
+    of the rig's CAN databases; `test` of what rig and recording state of the test (identity.py). Raises RecordingError
+    (exit code 3) for a file that cannot be read, is truncated, or lacks a channel; ConfigurationError (2) for
+    databases, units and parts.
     """
     rig = replace(rig, dbc=tuple(Path(p) for p in dbc)) if dbc else rig
     paths = rig.files(Path(path)) if isinstance(path, (str, Path)) else _each(path, rig)
     if len(paths) == 1 and part_of(paths[0], rig.parts) is None:
         rig = rig.in_one_file()
         contents, source = _read_file(paths[0], rig)
-        return assemble(contents, rig, source)
-    joined = join(paths, rig, _read_file)
-    return assemble(joined.contents, rig, joined.source, joined.u_clock)
+        found = assemble(contents, rig, source)
+    else:
+        joined = join(paths, rig, _read_file)
+        found = assemble(joined.contents, rig, joined.source, joined.u_clock)
+    return replace(found, test=identify(rig.test, (s for file in found.source.files for s in file.stated), test))
 
 
 def _each(paths: Sequence[str | Path], rig: Rig) -> tuple[Path, ...]:
@@ -124,6 +134,7 @@ def _read_file(path: Path, rig: Rig) -> tuple[Contents, Source]:
         notes=contents.notes,
         damage=(*contents.damage, *altered),
         provenance=provenance,
+        stated=contents.stated,
     )
     return contents, source
 

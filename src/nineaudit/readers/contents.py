@@ -9,13 +9,14 @@ from typing import Any
 
 from nineaudit.bus import Bus
 from nineaudit.errors import RecordingError
+from nineaudit.identity import Stated
 from nineaudit.recording import Damage, Trace
 
 
 @dataclass(frozen=True)
 class Contents:
     """Signals of a file, one a channel, as recorded; what its container held; what there is to say about it; what
-    of it could not be read; and the record of a repair that stands in it."""
+    of it could not be read; the record of a repair that stands in it; and what it says of the test."""
 
     traces: tuple[Trace, ...]
     counts: Mapping[str, float] = field(default_factory=dict)
@@ -23,6 +24,7 @@ class Contents:
     damage: tuple[Damage, ...] = ()
     bus: Bus | None = None
     provenance: Mapping[str, Any] | None = None
+    stated: tuple[Stated, ...] = ()
 
 
 def cut_short(path: Path, why: str, what_was_read: str, *, place: str | None = None) -> RecordingError:

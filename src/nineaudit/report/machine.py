@@ -41,6 +41,7 @@ def result_document(audit: Audit) -> dict[str, Any]:
         "schema": SCHEMA,
         "tool": _tool(audit.tool),
         "recording": _recording(audit.recording),
+        "test": audit.recording.test.document(),
         "rig": {"name": rig.name, "sha256": rig.sha256},
         "rulebook": {"sha256": audit.rulebook.sha256},
         "verdict": str(audit.verdict),

@@ -20,6 +20,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray, SensorArray, frozen
 from nineaudit.errors import ConfigurationError
+from nineaudit.identity import identify
 from nineaudit.physics import nap
 from nineaudit.physics.filters import cfc
 from nineaudit.recording import Clock, Recording, Source, Trace
@@ -174,4 +175,5 @@ def _recording(
         source=Source(path, "simulation", hashlib.sha256(content).hexdigest(), len(content), notes=notes),
         native=tuple(Trace(s.channel, s.signal, time, readings[:, i]) for i, s in enumerate(rig.array.sensors)),
         clocks=tuple(Clock(rate=rate, jitter=0.0) for _ in rig.array.sensors),
+        test=identify(rig.test),
     )

@@ -19,6 +19,7 @@ from nineaudit.readers.contents import Contents
 from nineaudit.readers.mme import channel as mme_channel
 from nineaudit.readers.mme.channel import CODE, FILTER_CLASSES, Channel, parse_header, parse_keys
 from nineaudit.readers.mme.files import LARGEST, Test, open_test
+from nineaudit.readers.mme.header import statements
 from nineaudit.recording import Damage, Trace
 from nineaudit.signals import suggestion
 from nineaudit.units import factor
@@ -72,6 +73,7 @@ def read_mme(path: Path, rig: Rig) -> Contents:
         counts,
         tuple(_notes(found, rig)),
         (*test.store.damage, *damage, *(d for r in read.values() for d in r.damage)),
+        stated=statements(test, found),
     )
 
 

@@ -1,0 +1,192 @@
+"""Which test a recording is of: rig file, header, option; what is not known; what contradicts."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from nineaudit.errors import ConfigurationError
+from nineaudit.identity import KEYS, Identity, Stated, from_options, identify, is_date, moment, stated
+from nineaudit.readers import read
+from nineaudit.report import result_document, result_schema
+from nineaudit.rig import load_rig, parse_rig
+from nineaudit.simulate import simulate
+from nineaudit.writers import write_recording
+
+RIG = '[rig]\npreset = "naap-3222"\n'
+TEST = """
+[test]
+number = "T0001"
+item = "head form"
+date = 2026-01-31
+laboratory = "Hall 3"
+"""
+
+
+def test_later_statements_take_the_place_of_earlier_ones_and_a_remark_says_so() -> None:
+    rig = stated({"item": "head form", "laboratory": "Hall 3"}, "rig file a.toml")
+    header = stated({"item": "torso", "number": "T1", "laboratory": "Hall 3"}, "header T1.mme")
+    found = identify(rig, header, stated({"number": "T2"}, "option --test"))
+    assert (found.item, found.number, found.laboratory, found.date) == ("torso", "T2", "Hall 3", "")
+    assert found.sources == {"number": "option --test", "item": "header T1.mme", "laboratory": "header T1.mme"}
+    assert found.remarks == (
+        "Test item: 'torso' (header T1.mme) is taken, not 'head form' (rig file a.toml)",
+        "Test number: 'T2' (option --test) is taken, not 'T1' (header T1.mme)",
+    )
+
+
+def test_what_is_stated_twice_and_differently_in_one_place_is_not_known() -> None:
+    parts = [Stated("number", "T1", "header a.mme"), Stated("number", "T2", "header b.mme")]
+    found = identify([], parts)
+    assert found.number == ""
+    assert "number" not in found.document()
+    assert found.remarks == (
+        "Test number: 'T1' (header a.mme), 'T2' (header b.mme): they contradict each other, and none is taken",
+    )
+    assert identify([], parts, [Stated("number", "T3", "option --test")]).number == "T3"
+    assert identify([], [parts[0], replace(parts[0], source="header b.mme")]).number == "T1"
+
+
+@pytest.mark.parametrize("text", ["31.01.2026", "2026-02-30", "20260131", "2026-1-31", "2026-W05-6", "٢٠٢٦-٠١-٣١", ""])
+def test_only_days_of_the_calendar_are_dates(text: str) -> None:
+    assert not is_date(text)
+    found = identify([Stated("date", text, "header T.mme")])
+    assert found.date == ""
+    assert found.remarks == (f"Date of the test: {text!r} (header T.mme) is no date YYYY-MM-DD and is not used",)
+
+
+def test_a_recording_started_on_another_day_is_remarked_time_zones_aside() -> None:
+    def on(started: str) -> tuple[str, ...]:
+        return identify([Stated("date", "2026-01-31", "rig file"), Stated("started", started, "log")]).remarks
+
+    assert on("2026-02-01T00:30:00.000") == ()
+    assert on("2026-02-03T09:00:00.000Z") == ("the recording was started on 2026-02-03, the test is dated 2026-01-31",)
+
+
+def test_moments_have_a_zone_where_there_is_one() -> None:
+    assert moment(1436509052.249713, True) == "2015-07-10T06:17:32.249Z"
+    assert moment(1436509052.0, False) == "2015-07-10T06:17:32.000"
+    assert moment(1e300, True) == ""
+
+
+def test_long_statements_are_cut_and_blanks_are_tidied() -> None:
+    assert stated({"item": "  head \n form "}, "x")[0].value == "head form"
+    assert len(stated({"notes": "a" * 5000}, "x")[0].value) == 501
+    assert stated({"item": " "}, "x") == ()
+
+
+def test_a_rig_file_states_what_all_tests_have_in_common(tmp_path: Path) -> None:
+    file = tmp_path / "rig.toml"
+    file.write_text(RIG + TEST)
+    made = simulate(load_rig(file), "general", seed=1).recording
+    assert made.test.known == {
+        "number": "T0001", "item": "head form", "date": "2026-01-31", "laboratory": "Hall 3"
+    }  # fmt: skip
+    assert set(made.test.sources.values()) == {"rig file rig.toml"}
+    assert simulate(parse_rig(RIG), "general", seed=1).recording.test == Identity()
+
+
+@pytest.mark.parametrize("value", ['"31.01.2026"', "2026-01-31T10:00:00", "2026", '"2026-02-30"'])
+def test_a_rig_file_with_a_bad_date_is_refused(value: str) -> None:
+    with pytest.raises(
+        ConfigurationError, match=r"\[test\] date: wrong value; found .*; expected a date as YYYY-MM-DD"
+    ):
+        parse_rig(f"{RIG}[test]\ndate = {value}\n")
+
+
+def test_an_unknown_key_of_the_table_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match=r"\[test\]: unknown key; found 'nummer'; .*did you mean 'number'"):
+        parse_rig(f'{RIG}[test]\nnummer = "T1"\n')
+
+
+def test_options_state_what_they_can() -> None:
+    found = from_options(["number=T=1", "item-serial=4711"])
+    assert [(s.key, s.value) for s in found] == [("number", "T=1"), ("item_serial", "4711")]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["T0001"], "no statement about the test; found 'T0001'; expected KEY=VALUE, KEY one of number"),
+        (["nummer=1"], "no statement about the test; found 'nummer=1'"),
+        (["number=1", "number=2"], "number is stated twice"),
+        (["item= "], "item without a value"),
+        (["date=31.1.2026"], "no date; found '31.1.2026'; expected a day as YYYY-MM-DD"),
+        (["started=2026-01-31"], "no statement about the test"),
+    ],
+)
+def test_options_that_state_nothing_are_refused(given: list[str], said: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        from_options(given)
+    assert said in str(caught.value)
+
+
+def test_every_key_is_in_identity_schema_and_rig_table() -> None:
+    from nineaudit.rig_schema import TestTable
+
+    block = result_schema()["properties"]["test"]["properties"]
+    assert set(KEYS) | {"started", "sources", "remarks"} == set(block) == set(Identity.__dataclass_fields__)
+    assert set(KEYS) == set(TestTable.model_fields)
+
+
+@pytest.fixture
+def mme(tmp_path: Path) -> Path:
+    path = tmp_path / "T9.zip"
+    write_recording(simulate(parse_rig(RIG), "general", seed=1).recording, path)
+    return path
+
+
+def _with_header(path: Path, text: str) -> Path:
+    """The archive with another header of the test."""
+    out = path.with_name("other.zip")
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(out, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, text if name.endswith(".mme") else old.read(name))
+    return out
+
+
+HEADER = """\
+Laboratory name             :Hall 3
+Customer name               :NOVALUE
+Title                       :sled, 50 km/h
+Laboratory test ref. number :S-17
+Date of the test            :2026-01-31
+Number of test objects      :2
+Name of test object 1       :head form
+Ref. number of test object 1:4711
+Name of test object 2       :barrier
+"""
+
+
+def test_the_header_of_a_test_is_read(mme: Path) -> None:
+    found = read(_with_header(mme, HEADER), parse_rig(RIG)).test
+    assert found.known == {
+        "number": "S-17", "title": "sled, 50 km/h", "item": "head form", "item_serial": "4711",
+        "date": "2026-01-31", "laboratory": "Hall 3",
+    }  # fmt: skip
+    assert set(found.sources.values()) == {"header T9.mme"}
+
+
+def test_a_header_with_another_kind_of_date_gives_no_date_and_a_remark(mme: Path) -> None:
+    found = read(_with_header(mme, HEADER.replace("2026-01-31", "31-JAN-2026")), parse_rig(RIG + TEST)).test
+    assert found.date == "2026-01-31"
+    assert found.sources["date"] == "rig file"
+    assert "Date of the test: '31-JAN-2026' (header T9.mme) is no date YYYY-MM-DD and is not used" in found.remarks
+
+
+def test_the_result_says_which_test_it_is(mme: Path) -> None:
+    from jsonschema import Draft202012Validator
+
+    from nineaudit import audit
+
+    about = from_options(["number=T2", "item=<script>alert(1)</script>"])
+    recording = read(_with_header(mme, HEADER), parse_rig(RIG), test=about)
+    document = result_document(audit(recording))
+    Draft202012Validator(result_schema()).validate(document)
+    assert document["test"]["number"] == "T2"
+    assert document["test"]["date"] == "2026-01-31"
+    assert document["test"]["sources"]["number"] == "option --test"
+    assert "customer" not in document["test"]
