@@ -239,11 +239,16 @@ def _printing(command: Callable[P, tuple[list[str], int]]) -> Callable[P, None]:
 
     @wraps(command)
     def run(*arguments: P.args, **options: P.kwargs) -> None:
-        lines, code = command(*arguments, **options)
-        _print(lines)
-        raise typer.Exit(code)
+        _ended(command(*arguments, **options))
 
     return run
+
+
+def _ended(done: str | tuple[list[str], int]) -> None:
+    """Print what a command returned, its text or its lines, and exit with its code."""
+    lines, code = ([done], 0) if isinstance(done, str) else done
+    _print(lines)
+    raise typer.Exit(code)
 
 
 app.command("motion", epilog=motion_command.EXAMPLE)(_printing(motion_command.motion))
@@ -256,7 +261,7 @@ for name, reference in (
     ("calibrate", calibrate_app),
     ("campaign", campaign_app),
 ):
-    app.add_typer(reference, name=name, result_callback=typer.echo)
+    app.add_typer(reference, name=name, result_callback=_ended)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
