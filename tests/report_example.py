@@ -18,12 +18,14 @@ from nineaudit.diagnose import Candidate, Diagnosis, Status
 from nineaudit.engine import sentence
 from nineaudit.estimate.budget import AlphaBudget
 from nineaudit.estimate.calibrated import Calibrated
+from nineaudit.estimate.information import Information
 from nineaudit.finding import Finding, Measure, Severity, Verdict
 from nineaudit.impact import Impact
 from nineaudit.physics import kinematics, rigid_body
 from nineaudit.reconstruct import Reconstruction
 from nineaudit.recording import Clock, Damage, Recording, Source, Trace
 from nineaudit.rig import Rig, Units, parse_rig, preset_text
+from nineaudit.sensed import Sensed
 from nineaudit.units import G0
 from nineaudit.waivers import Waiver
 
@@ -52,6 +54,7 @@ class Example:
     rest: Any = (-0.02, -0.001)
     budget: Any = None
     calibration: Any = None
+    sensors: Any = None
     apart: Any = None
     attitude: Any = None
     waivers: tuple[Waiver, ...] = ()
@@ -254,8 +257,14 @@ def example(n: int = 2001, *, path: str = "tests/T0001.blf", rig_text: str | Non
         motion, constraints, constraints_u, None, {bad: clipped}, 0.05 * G0 * np.arange(len(channels)),
         budget=budget, calibration=calibration, apart=apart,
         attitude=kinematics.orientation(motion.omega, motion.time), waivers=(WAIVER,),
-        command="nineaudit check tests/T0001.blf --rig rigs/head.toml",
+        command="nineaudit check tests/T0001.blf --rig rigs/head.toml", sensors=sensors(len(channels), calibration),
     )  # fmt: skip
+
+
+def sensors(count: int, calibration: Calibrated) -> Sensed:
+    """Gains of the first two channels, told a little."""
+    gains = Information(np.arange(2), np.zeros(2, dtype=int), np.full(2, 0.005), np.array([1.0, -2.0]), 3.0 * np.eye(2))
+    return Sensed(np.full(count, 500.0), "all channels", 1.02, calibration, gains)
 
 
 def healthy(n: int = 401) -> Example:
@@ -267,7 +276,7 @@ def healthy(n: int = 401) -> Example:
     return replace(
         audit, findings=passed, diagnosis=diagnosis, reconstruction=None, impact={}, verdict="pass", motion=None,
         constraints=None, constraints_u=None, flagged={}, budget=None, calibration=None, apart=None, attitude=None,
-        rest=None, waivers=(), command="",
+        rest=None, waivers=(), command="", sensors=Sensed(audit.sensors.peaks, "no whole-record fit"),
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from nineaudit import report
 from nineaudit.errors import RecordingError
 from nineaudit.finding import Finding, Measure, Severity, Verdict
 from nineaudit.report.numbers import digits, instant, plain, printable, probability, spelled, told_apart
+from nineaudit.report.sensors import unpacked
 from nineaudit.rig import parse_rig, preset_text
 from nineaudit.units import G0
 from report_example import ambiguous, example, healthy
@@ -34,6 +35,15 @@ def test_document_meets_its_schema(make: Any, validator: Draft202012Validator) -
     document = json.loads(report.to_json(report.result_document(make())))
     validator.validate(document)
     assert document["schema"] == "nineaudit/result/1"
+
+
+def test_what_the_data_say_of_the_sensors_is_packed_and_comes_back() -> None:
+    document = report.result_document(example())["sensors"]
+    eta, matrix = unpacked(document["information"])
+    assert eta.tolist() == [1.0, -2.0]
+    assert matrix.tolist() == [[3.0, 0.0], [0.0, 3.0]]
+    assert document["information"]["parameters"] == [["a0x", "gain"], ["a0y", "gain"]]
+    assert report.result_document(healthy())["sensors"]["information"] is None
 
 
 def test_a_bus_is_in_the_document_identifier_by_identifier(validator: Draft202012Validator) -> None:
@@ -112,7 +122,9 @@ def test_rate_sensors_speak_in_the_angular_rate_unit() -> None:
     rig = parse_rig(text)
     diagnosis = replace(audit.diagnosis, smallest_detectable={"gy": np.pi})
     recording = replace(audit.recording, rig=rig, readings=audit.recording.readings[:, :3])
-    document = report.result_document(replace(audit, diagnosis=diagnosis, recording=recording))
+    sensors = replace(audit.sensors, peaks=np.full(3, np.pi))
+    document = report.result_document(replace(audit, diagnosis=diagnosis, recording=recording, sensors=sensors))
+    assert [(c["peak"], c["unit"], c["shock"]) for c in document["sensors"]["channels"]] == [(180.0, "deg/s", None)] * 3
     assert document["diagnosis"]["smallest_detectable"] == {"gy": pytest.approx(180.0)}
     assert document["diagnosis"]["angular_rate_unit"] == "deg/s"
 

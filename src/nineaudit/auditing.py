@@ -31,6 +31,7 @@ from nineaudit.physics import kinematics, nap
 from nineaudit.reconstruct import Reconstruction, rebuild_channel
 from nineaudit.recording import Recording
 from nineaudit.rulebook import Rulebook, load_rulebook
+from nineaudit.sensed import Sensed, sensed
 from nineaudit.undo import undo
 from nineaudit.waivers import Waiver
 
@@ -107,6 +108,11 @@ class Audit:
         """The calibration as the fit behind the diagnosis has it; None where no whole record was fitted."""
         fitted = self._fit
         return None if fitted is None else _or(lambda: calibrated(fitted), lambda _: None)
+
+    @cached_property
+    def sensors(self) -> Sensed:
+        """What the recording says of each sensor, for a campaign to combine."""
+        return sensed(self.case, self.diagnosis, self.reconstruction)
 
     @cached_property
     def apart(self) -> FloatArray | None:

@@ -17,6 +17,7 @@ from nineaudit.finding import COVERAGE_FACTOR, Finding
 from nineaudit.report.bus_document import bus_document
 from nineaudit.report.findings import channels
 from nineaudit.report.numbers import at_edge, edge, instant, plain, sensor_edge
+from nineaudit.report.sensors import sensors_document
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -50,6 +51,7 @@ def result_document(audit: Audit) -> dict[str, Any]:
         "reconstruction": _reconstruction(audit),
         "impact": {name: _impact(impact, rig) for name, impact in audit.impact.items()},
         "bus": bus_document(audit.recording),
+        "sensors": sensors_document(audit.sensors, rig),
     }
     return sealed(document)
 
