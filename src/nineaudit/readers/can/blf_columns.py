@@ -17,8 +17,10 @@ _WORD: Final = np.dtype("<u8")
 _DTYPES: Final = {"time": "i8", "key": "u4", "channel": "u2", "kind": "u1", "length": "u1", "data": _WORD}
 _SMALL: Final = 1 << 17
 """Rows up to which a column grows by doubling, since then by a quarter."""
-
 _FEW: Final = 8
+"""Channels of a part that are looked for one by one."""
+_BLOCK: Final = 1 << 16
+"""Rows at a time, so that their places need little memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +109,8 @@ class Columns:
         columns: dict[str, Any] = {name: column.array() for name, column in self._columns.items()}
         long_rows, long = self._long or self._columns_of_long(0)
         present = np.flatnonzero(self._present)
-        codes = (np.cumsum(self._present) - 1).astype(np.uint16)
         return Frames(
-            bus=codes[columns.pop("channel")],
+            bus=_coded(columns.pop("channel"), self._present),
             buses=tuple(map(str, present.tolist())),
             data=columns.pop("data").view(np.uint8).reshape(-1, SHORT),
             long_rows=long_rows.array(),
@@ -117,3 +118,11 @@ class Columns:
             **columns,
             **rest,
         )
+
+
+def _coded(channel: NDArray[np.uint16], present: NDArray[np.bool_]) -> NDArray[np.uint16]:
+    """(n,) which of the channels that are `present` each is, in place."""
+    codes = (np.cumsum(present) - 1).astype(np.uint16)
+    for start in range(0, len(channel), _BLOCK):
+        channel[start : start + _BLOCK] = codes.take(channel[start : start + _BLOCK])
+    return channel

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nineaudit.readers.can.blf_chain import HEAD, Records, gather
+from nineaudit.readers.can.blf_chain import HEADER, Records, gather, uniform
 from nineaudit.readers.can.blf_columns import Columns, Part, Rows
-from nineaudit.readers.can.blf_objects import TYPES, Found, Group, Words
+from nineaudit.readers.can.blf_objects import TYPES, USUAL, Found, Group, Words
 from nineaudit.readers.can.blf_stream import Batch
-from nineaudit.readers.can.frames import SHORT
 from nineaudit.readers.can.losses import Losses
 from nineaudit.signals import can_origin
 
@@ -30,6 +29,7 @@ BEYOND: Final = 255
 """Code that stands for all types from 255 on, of which none is a CAN frame."""
 UNKNOWN_UNIT: Final = "frames stamped in a unit that is not known, read as ns"
 _LEAST: Final = np.array([TYPES[t].least if t in TYPES else 0 for t in range(BEYOND + 1)], dtype=np.int64)
+_IS_USUAL: Final = np.isin(np.arange(BEYOND + 1), list(USUAL))
 
 
 @dataclass
@@ -60,13 +60,22 @@ def add_frames(columns: Columns, batch: Batch, account: Account) -> None:
     part = columns.room(len(codes))
     _put_time(part.time, batch.heads, account)
     long: list[tuple[Rows, Words]] = []
-    for code in present:
-        if code in TYPES:
-            rows = np.flatnonzero(codes == code)
-            for some, size in [(rows, header)] if header else _by_header(batch, rows):
-                group = _group(batch, some, room, size, code, account)
-                long += _put(part, some, TYPES[code].read(group))
+    for code, rows in _by_type(codes, present):
+        for some, size in [(rows, header)] if header else _by_header(batch, rows):
+            group = _group(_Objects(batch, codes, room, account), some, size, TYPES[code].record)
+            long += _put(part, some, TYPES[code].read(group))
     columns.add_long(long)
+
+
+def _by_type(codes: Codes, present: Collection[int]) -> Iterator[tuple[int, Rows]]:
+    """Rows of each type of frames, those that are read together under one code."""
+    frames = [code for code in present if code in TYPES]
+    usual = [code for code in frames if code in USUAL]
+    if usual:
+        yield usual[0], np.arange(len(codes)) if frames == usual else np.flatnonzero(_IS_USUAL.take(codes))
+    for code in frames:
+        if code not in USUAL:
+            yield code, np.flatnonzero(codes == code)
 
 
 def _counted(codes: Codes) -> dict[int, int]:
@@ -84,10 +93,7 @@ def _counted(codes: Codes) -> dict[int, int]:
 
 def _common_header(heads: Records) -> int:
     """Bytes of the headers if they are all of one kind and that one is of frames, else 0."""
-    form = heads["form"]
-    if not len(heads) or form.min() != form.max() or _strange(heads[:1]).any():
-        return 0
-    return int(heads["header"][0])
+    return int(heads["header"][0]) if uniform(heads) and not _strange(heads[:1]).any() else 0
 
 
 def _origin(batch: Batch, rows: Rows) -> int:
@@ -116,7 +122,7 @@ def _keep(batch: Batch, codes: Codes, room: Sizes, header: int, account: Account
 
 def _strange(heads: Records) -> NDArray[np.bool_]:
     """(m,) true where a header is not of a kind that frames have."""
-    return np.asarray((heads["version"] > 2) | (heads["header"] < HEAD.itemsize))
+    return np.asarray((heads["version"] > 2) | (heads["header"] < HEADER))
 
 
 def _book(account: Account, batch: Batch, what: str, fault: NDArray[np.bool_], lost: int = 0) -> None:
@@ -128,16 +134,16 @@ def _late(heads: Records, start: int) -> Any:
     most = np.iinfo(np.int64).max - max(start, 0)
     if int(heads["time"].max(initial=0)) <= most // _TEN_MICROSECONDS:
         return np.zeros(1, dtype=np.bool_)
-    limit = np.where(heads["flags"] == _TENS, most // _TEN_MICROSECONDS, most)
+    limit = np.where(heads["unit"] == _TENS, most // _TEN_MICROSECONDS, most)
     return heads["time"] > limit.astype(np.uint64)
 
 
 def _put_time(time: NDArray[np.int64], heads: Records, account: Account) -> None:
     """Fill (m,) ns: since 1970 where the log's header has a date, else since the log's start."""
     time[:] = heads["time"]
-    other = heads["flags"] != _NANOSECONDS
+    other = heads["unit"] != _NANOSECONDS
     if other.any():
-        tens = heads["flags"] == _TENS
+        tens = heads["unit"] == _TENS
         time[tens] *= _TEN_MICROSECONDS
         account.odd[UNKNOWN_UNIT] += int(np.count_nonzero(other & ~tens))
     time += account.start
@@ -150,8 +156,21 @@ def _by_header(batch: Batch, rows: Rows) -> Iterator[tuple[Rows, int]]:
         yield rows[headers == header], header
 
 
-def _group(batch: Batch, rows: Rows, room: Sizes, header: int, code: int, account: Account) -> Group:
-    at = batch.at.take(rows)
+@dataclass(frozen=True, eq=False)
+class _Objects:
+    """Objects of a batch with their types and the bytes behind their headers."""
+
+    batch: Batch
+    codes: Codes
+    room: Sizes
+    account: Account
+
+
+def _group(objects: _Objects, rows: Rows, header: int, record: np.dtype[Any]) -> Group:
+    """Some of the objects, all with such a header, with their records behind it."""
+    batch, account = objects.batch, objects.account
+    every = len(rows) == len(objects.codes)
+    at, code, room = (x if every else x.take(rows) for x in (batch.at, objects.codes, objects.room))
 
     def damaged(what: str, fault: NDArray[np.bool_]) -> None:
         _book(account, replace(batch, at=at), what, fault)
@@ -159,17 +178,23 @@ def _group(batch: Batch, rows: Rows, room: Sizes, header: int, code: int, accoun
     def odd(what: str, count: int) -> None:
         account.odd[what] += count
 
-    return Group(gather(batch.buffer, at + header, TYPES[code].record), room.take(rows), header, damaged, odd)
+    def part(some: Rows, other: np.dtype[Any]) -> Group:
+        return _group(objects, rows[some], header, other)
+
+    if every and header == HEADER and record.itemsize == batch.heads.dtype["behind"].itemsize:
+        found = batch.heads["behind"].view(record)
+    else:
+        found = gather(batch.buffer, at + header, record)
+    return Group(code, found, room, header, damaged, odd, part)
 
 
 def _put(part: Part, rows: Rows, found: Found) -> list[tuple[Rows, Words]]:
     """Fill the rows of a part; rows and data of those frames that have more than eight bytes."""
-    where = slice(None) if len(rows) == len(part.time) else rows
+    every = len(rows) == len(part.time)
+    where = slice(None) if every else rows
     part.key[where], part.channel[where] = found.key, found.channel
     part.kind[where], part.length[where] = found.kind, found.length
-    if found.data.ndim == 1:
-        part.data[where] = found.data
+    part.data[where] = found.data
+    if found.long is None or found.long_rows is None or not len(found.long):
         return []
-    part.data[where] = found.data[:, 0]
-    long = np.flatnonzero(found.length > SHORT)
-    return [(rows[long], found.data[long])] if len(long) else []
+    return [(found.long_rows if every else rows[found.long_rows], found.long)]

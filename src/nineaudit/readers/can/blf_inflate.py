@@ -15,7 +15,9 @@ _HEADER: Final = struct.Struct("<4xH10x")  # of every object (blf_chain.HEAD): t
 _CONTAINER: Final = struct.Struct("<H6xL4x")  # method of compression, inflated size; then the content
 _STORED, _DEFLATED = 0, 2
 _DENSEST: Final = 1032
-"""Bytes that one deflated byte can be at most: what is short enough can be inflated without a limit."""
+"""Bytes that one deflated byte can be at most: what is short enough can be inflated without a limit,"""
+_AT_ONCE: Final = 5
+"""so that it is at most this many times LARGEST: the usual 128 KiB are, however badly they deflate."""
 NOTHING_BEGINS: Final = "no object where one must begin"
 ENDS_IN_OBJECT: Final = "the file ends inside of an object"
 
@@ -138,9 +140,10 @@ def _stored(body: memoryview, stated: int) -> tuple[bytes, str | None, bool]:
 
 def _inflated(body: memoryview, stated: int) -> tuple[bytes, str | None, bool]:
     """Content, why there is none, and whether it is all; never more than LARGEST bytes, whatever is stated."""
-    if len(body) <= LARGEST // _DENSEST and stated <= LARGEST:
+    if len(body) <= _AT_ONCE * LARGEST // _DENSEST and stated <= LARGEST:
         with contextlib.suppress(zlib.error):  # what is wrong is found below
-            return zlib.decompress(body, bufsize=stated or 1), None, True
+            content = zlib.decompress(body, bufsize=stated or 1)
+            return (content, None, True) if len(content) <= LARGEST else (b"", _too_large(), True)
     stream = zlib.decompressobj()
     try:
         content = stream.decompress(body, min(stated, LARGEST) + 1)
@@ -152,5 +155,9 @@ def _inflated(body: memoryview, stated: int) -> tuple[bytes, str | None, bool]:
     except zlib.error:
         return b"", "the deflated data of a container is damaged", True
     if len(content) > LARGEST:
-        return b"", f"a container inflates to more than {LARGEST} bytes", True
+        return b"", _too_large(), True
     return content, None, stream.eof
+
+
+def _too_large() -> str:
+    return f"a container inflates to more than {LARGEST} bytes"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from nineaudit.readers.can.blf_chain import Records
 from nineaudit.readers.can.frames import ERROR, ERROR_STATE, FD, LONG, OVERLOAD, RATE_SWITCH, REMOTE, SENT, SHORT
 
 Words = NDArray[np.uint64]
+Rows = NDArray[np.intp]
 
 # What follows the header in each object, after python-can's blf.py and Wireshark's blf.h (both after Vector BLF by
 # T. Lorenz). CAN_MESSAGE and CAN_MESSAGE2: channel, flags, length code, identifier, data (then, in CAN_MESSAGE2,
@@ -64,25 +65,31 @@ _FD_FLAGS: Final = _table({1: FD, 2: RATE_SWITCH, 4: ERROR_STATE})
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """k objects of one type with headers of one size: `record` (k,), `room` (k,) bytes behind the header. `damaged`
-    books frames (k,) that are, `odd` counts what is worth saying."""
+    """k objects that begin alike, of types `code` (k,), with headers of one size: `record` (k,), a copy of what is in
+    the log, `room` (k,) bytes behind the header. `damaged` books frames (k,) that are, `odd` counts what is worth
+    saying; `part` gives some of them with another record."""
 
+    code: NDArray[np.uint8]
     record: Records
     room: NDArray[np.int64]
     header: int
     damaged: Callable[[str, NDArray[np.bool_]], None]
     odd: Callable[[str, int], None]
+    part: Callable[[Rows, np.dtype[Any]], Group]
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """k frames: channel as the log has it, key and kind as in Frames, length, data (k,) words or (k,8)."""
+    """k frames: channel as the log has it, key and kind as in Frames, length, the first word of data (k,); those that
+    have more than eight bytes are `long_rows` (m,) of them, with all their data in `long` (m,8)."""
 
     channel: Any
     key: Any
     kind: Any
     length: Any
     data: Words
+    long_rows: Rows | None = None
+    long: Words | None = None
 
 
 @dataclass(frozen=True)
@@ -94,12 +101,34 @@ class Type:
     read: Callable[[Group], Found]
 
 
-def _classic(group: Group) -> Found:
-    record = group.record
-    kind = _sent(record["flags"], group)
+def _usual(group: Group) -> Found:
+    """Classic frames, and those of CAN_FD_MESSAGE among them, which begin alike."""
+    record, flexible = group.record, np.flatnonzero(group.code == _CAN_FD_MESSAGE)
+    kind, dlc = _sent(record["flags"], group), np.ascontiguousarray(record["dlc"])
+    dlc[flexible] = SHORT  # nothing odd: they are looked at below
     remote = kind & REMOTE != 0
-    length = _there(_short(record["dlc"], group), group.room - _HEAD, remote, group)
-    return Found(record["channel"], record["id"] & _KEY, kind, length, _cut(record["data"], length * ~remote))
+    length = _there(_short(dlc, group), group.room - _HEAD, remote, group)
+    data = _cut(record["data"], length * ~remote)
+    found = Found(record["channel"], record["id"] & _KEY, kind, length, data)
+    return _with_flexible(found, flexible, group.part(flexible, _FD)) if len(flexible) else found
+
+
+def _with_flexible(found: Found, rows: Rows, group: Group) -> Found:
+    """Frames of which some are of CAN_FD_MESSAGE, and that group: what they have otherwise put in place."""
+    kind = found.kind[rows] | _FD_FLAGS.take(group.record["fd"])
+    remote = kind & REMOTE != 0
+    length = _there(_valid(group, kind, remote), group.room - (_FD.itemsize - LONG), remote, group)
+    data = group.record["data"] & _KEEP.take(length * ~remote, axis=0)
+    found.kind[rows], found.length[rows], found.data[rows] = kind, length, data[:, 0]
+    return replace(found, **_long(length, data, rows))
+
+
+def _long(length: NDArray[np.uint8], data: Words, rows: Rows | None = None) -> dict[str, Any]:
+    """Of frames with (k,8) data those that have more than eight bytes; `rows` are theirs if not 0 to k - 1."""
+    if length.min(initial=LONG) > SHORT and rows is not None:
+        return {"long_rows": rows, "long": data}
+    long = np.flatnonzero(length > SHORT)
+    return {"long_rows": long if rows is None else rows[long], "long": data[long]}
 
 
 def _cut(data: Words, length: NDArray[np.uint8]) -> Words:
@@ -135,16 +164,6 @@ def _short(dlc: NDArray[np.uint8], group: Group) -> NDArray[np.uint8]:
     return np.minimum(dlc, np.uint8(SHORT))
 
 
-def _fd(group: Group) -> Found:
-    record = group.record
-    kind = _sent(record["flags"], group) | _FD_FLAGS[record["fd"]]
-    remote = kind & REMOTE != 0
-    length = _there(_valid(group, kind, remote), group.room - (_FD.itemsize - LONG), remote, group)
-    return Found(
-        record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP.take(length * ~remote, axis=0)
-    )
-
-
 def _fd64(group: Group) -> Found:
     """The bytes of data that an object states and does not hold are zero: CANoe and Vector's library read it so
     (python-can's issue 1905), since some loggers leave them out."""
@@ -158,8 +177,8 @@ def _fd64(group: Group) -> Found:
     more = record["more"].astype(np.int64)
     there = np.where(more > 0, np.minimum(more - group.header, group.room), group.room) - (_FD64.itemsize - LONG)
     group.odd(ZERO_FILLED, _count(~remote & (there < length)))
-    kept = np.clip(there, 0, length) * ~remote
-    return Found(record["channel"], record["id"] & _KEY, kind, length, record["data"] & _KEEP.take(kept, axis=0))
+    data = record["data"] & _KEEP.take(np.clip(there, 0, length) * ~remote, axis=0)
+    return Found(record["channel"], record["id"] & _KEY, kind, length, data[:, 0], **_long(length, data))
 
 
 def _valid(group: Group, kind: NDArray[np.uint8], remote: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -186,10 +205,11 @@ def _count(mask: Any) -> int:
 
 
 _HEAD: Final = _CLASSIC.itemsize - SHORT
+_CAN_FD_MESSAGE: Final = 100
 TYPES: Final[Mapping[int, Type]] = {
-    1: Type(_HEAD, _CLASSIC, _classic),  # CAN_MESSAGE
-    86: Type(_HEAD, _CLASSIC, _classic),  # CAN_MESSAGE2
-    100: Type(_FD.itemsize - LONG, _FD, _fd),  # CAN_FD_MESSAGE
+    1: Type(_HEAD, _CLASSIC, _usual),  # CAN_MESSAGE
+    86: Type(_HEAD, _CLASSIC, _usual),  # CAN_MESSAGE2
+    _CAN_FD_MESSAGE: Type(_FD.itemsize - LONG, _CLASSIC, _usual),
     101: Type(_FD64.itemsize - LONG, _FD64, _fd64),  # CAN_FD_MESSAGE_64
     73: Type(_WIDE.itemsize, _WIDE, _no_data(ERROR)),  # CAN_ERROR_EXT
     2: Type(_WIDE.itemsize, _WIDE, _no_data(ERROR)),  # CAN_ERROR
@@ -197,3 +217,5 @@ TYPES: Final[Mapping[int, Type]] = {
     3: Type(_WIDE.itemsize, _WIDE, _no_data(OVERLOAD)),  # CAN_OVERLOAD
 }
 """The types of objects that are CAN frames, the usual first."""
+USUAL: Final = frozenset(code for code, kind in TYPES.items() if kind.read is _usual)
+"""Those that are read together."""

@@ -42,7 +42,8 @@ class Frames:
     `data` (n,8) uint8 first eight bytes, zero-filled; frames of more are row `long_rows` (m,) of the log and have all
     their bytes in `long` (m,64).
     `counts`: what the container held besides; `damage`: what could not be read; `origin`: ns to add to every stamp for
-    the time the log's signals were written with (nineaudit's own logs), 0 if none.
+    the time the log's signals were written with (nineaudit's own logs), 0 if none; `started`: when the log says that
+    the measurement began (ISO 8601), "" where it does not or the stamps say so.
     """
 
     time: Int64
@@ -58,6 +59,7 @@ class Frames:
     damage: tuple[Damage, ...] = ()
     notes: tuple[str, ...] = ()
     origin: int = 0
+    started: str = ""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -70,12 +72,13 @@ class Frames:
     def rows_of(self, key: int) -> Rows:
         """Rows of the data frames of an identifier, in the order of the log."""
         rows = np.flatnonzero(self.key == np.uint32(key))
-        return np.asarray(rows[(self.kind[rows] & NOT_DATA) == 0])
+        data = (self.kind.take(rows) & NOT_DATA) == 0
+        return rows if data.all() else rows[data]
 
     def payload(self, rows: Rows) -> ByteMatrix:
         """(len(rows), 8 or 64) bytes of frames, zero-filled: 64 only where one of them has more than 8."""
-        short = self.data[rows]
-        if not len(self.long_rows) or not (self.length[rows] > SHORT).any():
+        short = _words(self.data).take(rows).view(np.uint8).reshape(-1, SHORT)
+        if not len(self.long_rows) or not (self.length.take(rows) > SHORT).any():
             return short
         out = np.zeros((len(rows), LONG), dtype=np.uint8)
         out[:, :SHORT] = short
@@ -91,6 +94,11 @@ class Frames:
         place[self.long_rows] = np.arange(len(self.long_rows))
         long_rows = np.flatnonzero(place[rows] >= 0)
         return replace(self, **columns, long_rows=long_rows, long=self.long[place[rows[long_rows]]])
+
+
+def _words(data: ByteMatrix) -> NDArray[np.uint64]:
+    """(n,) what (n,8) bytes are as words, of which many are taken much faster."""
+    return np.ascontiguousarray(data).view(np.uint64).reshape(-1)
 
 
 def frames(
