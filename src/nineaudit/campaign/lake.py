@@ -18,13 +18,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from nineaudit.errors import ConfigurationError
-from nineaudit.files import write_whole
+from nineaudit.files import settle
 
 LAKE: Final = "nineaudit/lake/1"
 ENTRY: Final = "nineaudit/lake-entry/1"
@@ -156,12 +157,26 @@ def write(lake: Lake, name: str, document: Mapping[str, Any]) -> None:
 
 def write_text(lake: Lake, name: str, text: str) -> None:
     """Write a text: whole or not at all."""
+    write_bytes(lake, name, text.encode())
+
+
+def write_bytes(lake: Lake, name: str, data: bytes) -> None:
+    """Write a file: whole or not at all."""
     if lake.local:
         place = Path(lake.place(name))
         place.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(place, text)
+        _write_whole(place, data)
     else:
-        lake.fs.pipe_file(lake.place(name), text.encode())
+        lake.fs.pipe_file(lake.place(name), data)
+
+
+def _write_whole(place: Path, data: bytes) -> None:
+    partial = place.with_name(f".{place.name}.{os.getpid()}.{threading.get_ident()}")
+    try:
+        partial.write_bytes(data)
+        settle(partial, place)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def exists(lake: Lake, name: str) -> bool:
