@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -11,10 +12,12 @@ import pytest
 from nineaudit.errors import ConfigurationError
 from nineaudit.identity import KEYS, Identity, Stated, from_options, identify, is_date, moment, stated
 from nineaudit.readers import read
+from nineaudit.readers.can.asc import read_asc
 from nineaudit.report import result_document, result_schema
 from nineaudit.rig import load_rig, parse_rig
 from nineaudit.simulate import simulate
 from nineaudit.writers import write_recording
+from recordings import array_rig, database, motion, write_any
 
 RIG = '[rig]\npreset = "naap-3222"\n'
 TEST = """
@@ -190,3 +193,82 @@ def test_the_result_says_which_test_it_is(mme: Path) -> None:
     assert document["test"]["date"] == "2026-01-31"
     assert document["test"]["sources"]["number"] == "option --test"
     assert "customer" not in document["test"]
+
+
+@pytest.mark.parametrize("suffix", [".mme", ".zip"])
+def test_a_test_goes_to_iso_mme_and_comes_back(suffix: str, tmp_path: Path) -> None:
+    about = from_options(["number=T7", "date=2026-01-31", "item=head form", "item_serial=4711", "customer=C: & Co"])
+    made = simulate(parse_rig(RIG), "general", seed=1).recording
+    written = write_recording(replace(made, test=identify(about)), tmp_path / f"out{suffix}")
+    found = read(written.path, parse_rig(RIG)).test
+    assert found.known == {
+        "number": "T7", "item": "head form", "item_serial": "4711", "date": "2026-01-31", "customer": "C: & Co",
+    }  # fmt: skip
+    assert set(found.sources.values()) == {"header out.mme"}
+
+
+def test_what_is_not_known_is_not_made_up_in_a_header(mme: Path) -> None:
+    assert read(mme, parse_rig(RIG)).test == Identity()
+
+
+def test_a_test_goes_to_mcap_and_comes_back(tmp_path: Path) -> None:
+    made = simulate(parse_rig(RIG), "general", seed=1).recording
+    about = identify(from_options(["number=T7", "notes=second try"]))
+    write_recording(replace(made, test=about), tmp_path / "a.mcap")
+    found = read(tmp_path / "a.mcap", parse_rig(RIG)).test
+    assert found.known == {"number": "T7", "notes": "second try"}
+    assert found.sources["number"] == "metadata of a.mcap"
+
+
+BEGAN = 1_769_846_400.25
+"""s since 1970 on that day, UTC; logs that python-can writes for these tests start at 1.7e9 s."""
+DAY = "2026-01-31T08:00:00"
+
+
+@pytest.mark.parametrize(
+    ("suffix", "moment_said"),
+    [(".mcap", f"{DAY}.250Z"), (".csv", f"{DAY}.250"), (".parquet", f"{DAY}.250")],
+)
+def test_stamps_that_are_dates_say_when_the_recording_was_started(
+    suffix: str, moment_said: str, tmp_path: Path
+) -> None:
+    made = simulate(parse_rig(RIG), "general", seed=1).recording
+    path = tmp_path / f"a{suffix}"
+    write_recording(replace(made, time=made.time - made.time[0] + BEGAN), path)
+    found = read(path, parse_rig(RIG)).test
+    assert (found.started, found.date, found.sources) == (moment_said, "", {"started": f"a{suffix}"})
+
+
+def test_stamps_since_power_on_are_no_date(tmp_path: Path) -> None:
+    made = simulate(parse_rig(RIG), "general", seed=1).recording
+    write_recording(replace(made, time=made.time - made.time[0] + 3e6), tmp_path / "a.csv")
+    assert read(tmp_path / "a.csv", parse_rig(RIG)).test == Identity()
+
+
+@pytest.mark.parametrize(("suffix", "said"), [(".log", "2023-11-14T22:13:20.000Z"), (".blf", f"{DAY}.250")])
+def test_can_logs_with_dates_say_when_they_were_started(suffix: str, said: str, tmp_path: Path) -> None:
+    rig = array_rig()
+    made = motion(rig)
+    path = write_any(replace(made, time=made.time - made.time[0] + BEGAN), tmp_path, suffix)
+    found = read(path, rig, dbc=[database(rig, tmp_path)]).test
+    assert found.started == said
+
+
+@pytest.mark.parametrize(
+    ("date", "said"),
+    [(b"Sat Jan 31 08:00:00.250 am 2026", "2026-01-31T08:00:00.250"), (b"Sa 31.01.2026", "")],
+)
+def test_an_asc_log_says_when_it_was_started_if_its_date_can_be_read(date: bytes, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.asc"
+    path.write_bytes(b"date " + date + b"\nbase hex  timestamps absolute\n   0.001 1  123  Rx   d 1 01\n")
+    assert read_asc(path).started == said
+
+
+def test_an_mf4_file_says_when_it_was_started(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    made = simulate(parse_rig(RIG), "general", seed=1).recording
+    with asammdf.MDF() as log:
+        log.header.start_time = datetime(2026, 1, 31, 8, 0, 0, 250_000, tzinfo=UTC)
+        log.append([asammdf.Signal(t.values, t.time, name=t.signal, unit="m/s^2") for t in made.native])
+        log.save(tmp_path / "a.mf4")
+    assert read(tmp_path / "a.mf4", parse_rig(RIG)).test.started == "2026-01-31T08:00:00.250+00:00"

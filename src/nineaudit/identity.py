@@ -27,9 +27,13 @@ KEYS: Final[Mapping[str, str]] = {
     "notes": "Notes",
 }
 """What can be stated of a test, and what reports call it."""
+METADATA: Final = "test"
+"""Name of the metadata record of an MCAP log that states KEYS."""
 STARTED: Final = "Recording started"
 LONGEST: Final = 500
 """Characters of a statement that are kept."""
+EARLIEST: Final = 1990
+"""Year before which no recording was started."""
 _DATE: Final = re.compile(r"\d{4}-\d\d-\d\d")
 _A_DAY: Final = timedelta(days=1)
 """Clocks of all time zones are within a day of the date at the test."""
@@ -136,12 +140,17 @@ def _apart(values: Mapping[str, str]) -> tuple[str, ...]:
 
 def moment(seconds: float, zone: bool) -> str:
     """A time stamp, s since 1970, as ISO 8601 to the millisecond, with Z where it is known to be UTC; "" for one that
-    the calendar does not have."""
+    the calendar does not have, or before there were loggers with a clock (it counts from something else)."""
     try:
-        text = datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None).isoformat(timespec="milliseconds")
+        found = datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None)
     except (OverflowError, ValueError, OSError):
         return ""
-    return text + ("Z" if zone else "")
+    return found.isoformat(timespec="milliseconds") + ("Z" if zone else "") if found.year >= EARLIEST else ""
+
+
+def began(moment: str, source: str) -> tuple[Stated, ...]:
+    """The statement that a recording was started then; none for ""."""
+    return (Stated("started", moment, source),) if moment else ()
 
 
 def from_options(given: Sequence[str]) -> tuple[Stated, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from nineaudit.array import FloatArray
+from nineaudit.identity import KEYS, METADATA
 from nineaudit.recording import Recording
 from nineaudit.signals import MCAP_ORIGIN, in_unit, time_unit
 from nineaudit.units import factor
@@ -32,6 +33,8 @@ def write_mcap(recording: Recording, readings: FloatArray, path: Path, _: Sequen
         writer.start()
         if origin:
             writer.add_metadata("nineaudit", {MCAP_ORIGIN: str(origin)})
+        if about := {key: value for key, value in recording.test.known.items() if key in KEYS}:
+            writer.add_metadata(METADATA, about)
         topics = _topics(recording, readings)
         channels = {topic: _channel(writer, topic) for topic in topics}
         for i, stamp in enumerate((stamps - origin).tolist()):

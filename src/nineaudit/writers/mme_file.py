@@ -69,7 +69,7 @@ def _write(recording: Recording, readings: FloatArray, stem: str, put: Put, head
     for i, (keys, _) in enumerate(channels, 1):
         index[f"Name of channel {i:03d}"] = f"{keys['Channel code']} / {keys['Name of the channel']}"
     put(f"{CHANNEL}/{stem}.chn", _text(index))
-    put(header, _text(_test(recording, stem)))
+    put(header, _text(_test(recording)))
     made_up = [s.channel for s in recording.rig.array.sensors if not _CODE.fullmatch(s.signal)]
     note = f"channel codes made up, for the rig names none: {', '.join(made_up)}"
     return Outcome(notes=(note,) if made_up else ())
@@ -172,19 +172,22 @@ def _time_header(recording: Recording) -> Header:
     }
 
 
-def _test(recording: Recording, stem: str) -> Header:
-    source = recording.source
+def _test(recording: Recording) -> Header:
+    """The header of the test: what is known of it, and where the readings come from."""
+    source, test = recording.source, recording.test
     return {
         "Data format edition number": "1.6",
-        "Laboratory name": "NOVALUE",
-        "Customer name": "NOVALUE",
+        "Laboratory name": test.laboratory or "NOVALUE",
+        "Customer name": test.customer or "NOVALUE",
         "Customer test ref. number": "NOVALUE",
-        "Title": recording.rig.name,
+        "Title": test.title or "NOVALUE",
         "Medium No. / number of media": "1 / 1",
         "Type of the test": "NOVALUE",
-        "Laboratory test ref. number": stem,
+        "Laboratory test ref. number": test.number or "NOVALUE",
+        "Date of the test": test.date or "NOVALUE",
         "Number of test objects": "1",
-        "Name of test object 1": recording.rig.name,
+        "Name of test object 1": test.item or "NOVALUE",
+        "Ref. number of test object 1": test.item_serial or "NOVALUE",
         "Comments": f"written by nineaudit from {source.path.name} (SHA-256 {source.sha256}), which is not altered",
     }
 

@@ -119,6 +119,7 @@ def read_asc(path: Path) -> Frames:
         damage=log.account.damage,
         notes=tuple(_notes(log)),
         origin=log.origin,
+        started=_started(log).replace(" ", "T"),
     )
 
 
@@ -206,6 +207,12 @@ def _header(log: _Log, text: bytes) -> str | None:
     elif not _BASE.fullmatch(text) and not _INTERNAL.fullmatch(text):
         return None
     return "header_lines"
+
+
+def _started(log: _Log) -> str:
+    """The date of the measurement's start, "" where there is none that can be read."""
+    began = date_of(log.dates[-1 if log.begun == 1 else 0]) if log.dates else ""
+    return "" if began.startswith(("'", '"')) else began
 
 
 def _notes(log: _Log) -> Iterator[str]:

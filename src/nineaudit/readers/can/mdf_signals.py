@@ -3,6 +3,7 @@ than one group is told apart as Group.Channel, by the group's acquisition name o
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from nineaudit.array import frozen
 from nineaudit.errors import RecordingError
+from nineaudit.identity import EARLIEST, Stated, began
 from nineaudit.readers.can.mdf import holds_frames, opened
 from nineaudit.readers.can.reader import read_can
 from nineaudit.readers.contents import Contents
@@ -28,7 +30,14 @@ def read_mf4(path: Path, rig: Rig) -> Contents:
     with opened(path) as log:
         if not holds_frames(log):
             return read_signals(log, path, rig)
-    return read_can(path, rig)
+        about = _started(log, path)
+    return replace(read_can(path, rig), stated=about)
+
+
+def _started(log: Any, path: Path) -> tuple[Stated, ...]:
+    """When the measurement began, by the header (HDBLOCK), with the zone that it states; () where it has no date."""
+    moment = log.header.start_time
+    return began(moment.isoformat(timespec="milliseconds"), path.name) if moment.year >= EARLIEST else ()
 
 
 def read_signals(log: Any, path: Path, rig: Rig) -> Contents:
@@ -47,7 +56,7 @@ def read_signals(log: Any, path: Path, rig: Rig) -> Contents:
         traces.append(Trace(sensor.channel, signal.name, frozen(time), frozen(values), signal.unit or None))
     counts = {"groups": float(len(log.groups)), "invalid_values": float(invalid)}
     note = f"time counts from the start of the measurement, {log.header.start_time.isoformat()}"
-    return Contents(tuple(traces), counts, (note,))
+    return Contents(tuple(traces), counts, (note,), stated=_started(log, path))
 
 
 def _place(log: Any, name: str, channel: str, path: Path) -> tuple[int, int]:

@@ -14,6 +14,7 @@ from nineaudit.array import BoolArray, FloatArray, read_only
 from nineaudit.can_bits import bytes_needed
 from nineaudit.can_database import EXTENDED, BusSignal, Databases
 from nineaudit.errors import RecordingError
+from nineaudit.identity import began, moment
 from nineaudit.readers.can.asc import read_asc
 from nineaudit.readers.can.blf import read_blf
 from nineaudit.readers.can.bus_signals import unavailable
@@ -64,6 +65,7 @@ def read_can(path: Path, rig: Rig) -> Contents:
             notes += others
             left_out += seen[signal.key] - len(rows[signal.key])
     base, dated = _base(log, rows)
+    started = began(log.started or (moment((base + log.origin) / 1e9, _is_utc(path)) if dated else ""), path.name)
     traces, bad, silent = [], dict[int, tuple[int, int]](), 0
     for sensor, signal in zip(rig.array.sensors, found, strict=True):
         chosen = rows[signal.key]
@@ -86,7 +88,12 @@ def read_can(path: Path, rig: Rig) -> Contents:
     }
     bus = bus_of(log, messages, {key: int(log.bus[r[0]]) for key, r in rows.items()}, databases.bit_rate)
     said = (*log.notes, *dated, *notes, *databases.notes)
-    return Contents(tuple(traces), counts, said, (*log.damage, *_cut(databases)), bus)
+    return Contents(tuple(traces), counts, said, (*log.damage, *_cut(databases)), bus, stated=started)
+
+
+def _is_utc(path: Path) -> bool:
+    """Whether dates of a log's stamps are UTC: python-can and candump count from 1970; BLF has the logger's clock."""
+    return path.suffix.lower() in (".log", ".db", ".csv")
 
 
 def _cut(databases: Databases) -> Iterator[Damage]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray, read_only
 from nineaudit.errors import RecordingError
+from nineaudit.identity import began, moment
 from nineaudit.readers.clocks import alignment
 from nineaudit.readers.clocks.clock import clock_of, in_order
 from nineaudit.readers.clocks.resample import resample_columns
@@ -61,7 +62,11 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
         readings=readings,
         valid=read_only(np.isfinite(readings)),
         rig=alignment.with_timing(rig, alignments),
-        source=replace(source, notes=(*source.notes, *notes, *dated, *filter(None, huge), *cut, *said, *stated)),
+        source=replace(
+            source,
+            notes=(*source.notes, *notes, *dated, *filter(None, huge), *cut, *said, *stated),
+            stated=(*source.stated, *began(moment(origin, False), source.path.name)),
+        ),
         native=native,
         clocks=clocks,
         resampled=tuple(a.channel for a in alignments),

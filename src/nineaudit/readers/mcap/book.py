@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nineaudit.identity import KEYS, METADATA
 from nineaudit.provenance import MCAP_RECORD
 from nineaudit.readers.mcap import parse as parse
 from nineaudit.readers.mcap.damage import Damages
@@ -18,7 +19,7 @@ from nineaudit.signals import MCAP_ORIGIN
 @dataclass
 class Book:
     """What a log says as it is read: definitions, messages by channel id, counts, ns to add to log times, damage; the
-    `repair` that its metadata has the record of."""
+    `repair` that its metadata has the record of, and what that states of the `test`."""
 
     damages: Damages = field(default_factory=Damages)
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -30,6 +31,7 @@ class Book:
     unchecked: int = 0
     origin: int = 0
     repair: str | None = None
+    test: dict[str, str] = field(default_factory=dict)
     seen: int = 0
 
     @property
@@ -88,6 +90,8 @@ def _metadata(data: memoryview, record: Record, book: Book) -> None:
         name, found = parse.metadata(data, record)
         if name == MCAP_RECORD:
             book.repair = found.get("json", "")
+        if name == METADATA:
+            book.test = {key: found[key] for key in KEYS if key in found}
         book.origin = int(found.get(MCAP_ORIGIN, book.origin))
     except (Malformed, ValueError) as error:
         book.damages.add(f"metadata: {error}", record.at)

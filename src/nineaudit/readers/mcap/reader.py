@@ -16,6 +16,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray, frozen
 from nineaudit.errors import RecordingError
+from nineaudit.identity import began, moment, stated
 from nineaudit.provenance import parse
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.mcap.book import Book
@@ -48,7 +49,7 @@ def read_mcap(path: Path, rig: Rig) -> Contents:
         raise _nothing(path, book)
     places = [_place(sensor.signal, sensor.channel, topics) for sensor in rig.array.sensors]
     used = {topic: _streams(topics, topic) for topic in dict.fromkeys(topic for topic, _ in places)}
-    clocks, notes = _clocks(used, rig, book.origin)
+    clocks, base, notes = _clocks(used, rig, book.origin)
     traces = []
     for sensor, (topic, name) in zip(rig.array.sensors, places, strict=True):
         time, timed = clocks[topic]
@@ -60,7 +61,8 @@ def read_mcap(path: Path, rig: Rig) -> Contents:
     }
     repair = None if book.repair is None else parse(book.repair, path)
     notes = (*notes, *_notes(book, rig, used))
-    return Contents(tuple(traces), counts, notes, book.damages.all(), provenance=repair)
+    about = (*stated(book.test, f"metadata of {path.name}"), *began(moment(base / 1e9, True), path.name))
+    return Contents(tuple(traces), counts, notes, book.damages.all(), provenance=repair, stated=about)
 
 
 def mapped(path: Path) -> memoryview:
@@ -137,13 +139,13 @@ def _values(streams: Sequence[Stream], name: str) -> FloatArray:
     return found
 
 
-def _clocks(used: dict[str, list[Stream]], rig: Rig, origin: int) -> tuple[dict[str, Column], tuple[str, ...]]:
-    """(m,) s of each topic's messages, and which have a time. Dates count from the earliest, which the note says."""
+def _clocks(used: dict[str, list[Stream]], rig: Rig, origin: int) -> tuple[dict[str, Column], int, tuple[str, ...]]:
+    """(m,) s of each topic's messages, and which have a time. Dates count from the earliest, ns; the note says so."""
     stamps = {topic: _topic_stamps(streams, rig, origin) for topic, streams in used.items()}
     dates = {topic: _first_ns(stamp) for topic, stamp in stamps.items() if _first_ns(stamp) > _EPOCH_NS}
     base = min(dates.values(), default=0)
     clocks = {topic: _seconds(stamp, base if topic in dates else 0) for topic, stamp in stamps.items()}
-    return clocks, (f"time counts from log time {base} ns",) if base else ()
+    return clocks, base, (f"time counts from log time {base} ns",) if base else ()
 
 
 def _topic_stamps(streams: Sequence[Stream], rig: Rig, origin: int) -> Column:
