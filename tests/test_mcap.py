@@ -21,7 +21,6 @@ from mcap.writer import IndexType, Writer
 from mcap_logs import COMPRESSIONS, PQ, STEP_NS, expected, of, oracle, pairs, pq, rig_of, value, write_log
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import Contents
-from nineaudit.readers.mcap import chunk as mcap_chunk
 from nineaudit.readers.mcap.reader import read_mcap
 
 
@@ -409,7 +408,7 @@ def test_no_byte_changes_a_value_in_silence(tmp_path: Path, compression: str, da
 
 def test_the_largest_chunk_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_log(tmp_path / "t.mcap")
-    monkeypatch.setattr(mcap_chunk, "LARGEST", 500)
+    monkeypatch.setattr("nineaudit.readers.inflate.LARGEST", 500)
     found = pq(path)
     assert f"a chunk that states more bytes than it can hold ({int(found.counts['chunks']) - 1} times" in said(found)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import mmap
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,28 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from nineaudit.can_bits import ByteMatrix
-from nineaudit.can_database import EXTENDED
 from nineaudit.errors import ConfigurationError, RecordingError
-from nineaudit.readers.can.frames import (
-    ERROR,
-    ERROR_STATE,
-    FD,
-    IDENTIFIER,
-    LONG,
-    RATE_SWITCH,
-    REMOTE,
-    SENT,
-    SHORT,
-    Frames,
-    frames,
-    joined,
-)
+from nineaudit.readers.can.frames import ERROR, REMOTE, Frames, Int64, Rows, joined
+from nineaudit.readers.can.losses import Losses
+from nineaudit.readers.can.mdf_by_asammdf import by_asammdf
+from nineaudit.readers.can.mdf_layout import layout
+from nineaudit.readers.can.mdf_records import read_group
 from nineaudit.readers.contents import cut_short
 
 _HEADER_AT = 64
 _UNFINISHED = b"UnFinMF "
-_LAST_STANDARD = 0x7FF
 _KINDS = (("CAN_DataFrame", 0), ("CAN_RemoteFrame", REMOTE), ("CAN_ErrorFrame", ERROR))
 _BLOCK = struct.Struct("<4s4xQQ")  # id, length, number of links; links follow, 8 bytes each
 
@@ -66,7 +54,7 @@ def opened(path: Path) -> Iterator[Any]:
         ) from error
     _require_whole(path)
     try:
-        with MDF(path, process_bus_logging=False) as log:  # type: ignore[call-arg]  # among its **kwargs  # type: ignore[call-arg]  # passed on by **kwargs
+        with MDF(path, process_bus_logging=False) as log:  # type: ignore[call-arg]  # passed on by **kwargs
             yield log
     except (MdfException, ValueError, KeyError, IndexError, struct.error) as error:
         raise cut_short(path, " ".join(str(error).split())[:120], "no frames") from error
@@ -117,58 +105,31 @@ def _indices(log: Any, name: str) -> Iterator[int]:
 
 def _frames(log: Any, path: Path) -> Frames:
     """All bus events in the order of their stamps: data, remote and error frames are in groups of their own."""
-    parts = [
-        _part(log.get(name, group=index, raw=True), name, kind)
-        for name, kind in _KINDS
-        for index in _indices(log, name)
-    ]
+    losses = Losses("frames")
+    parts = [_part(log, index, name, kind, losses) for name, kind in _KINDS for index in _indices(log, name)]
     if not any(len(part) for part in parts):
         raise RecordingError(
-            "no CAN frames in this MF4 file", file=path, expected="raw frames (channels CAN_DataFrame)"
+            "no CAN frames in this MF4 file",
+            file=path,
+            found="; ".join(map(str, losses.damage())) or None,
+            expected="raw frames (channels CAN_DataFrame)",
         )
     note = f"time counts from the start of the measurement, {log.header.start_time.isoformat()}"
     highest = max(int(part.bus.max(initial=0)) for part in parts)
-    whole = joined(parts, buses=tuple(map(str, range(highest + 1))), notes=(note,))
-    order = np.argsort(whole.time, kind="stable")
-    return whole if np.array_equal(order, np.arange(len(order))) else whole.take(order)
+    buses = tuple(map(str, range(highest + 1)))
+    whole = joined(parts, buses=buses, notes=(note,), damage=losses.damage())
+    return whole if len(parts) == 1 else whole.take(_merged([part.time for part in parts]))
 
 
-def _part(records: Any, name: str, kind: int) -> Frames:
-    """Columns of one group of records (ASAM MDF bus logging: names of its channels)."""
-    fields = records.samples
-    count = len(fields)
-
-    def column(what: str) -> Any:
-        full = f"{name}.{what}"
-        return fields[full].astype(np.int64) if full in fields.dtype.names else np.zeros(count, dtype=np.int64)
-
-    ident = column("ID")
-    extended = column("IDE") != 0 if f"{name}.IDE" in fields.dtype.names else ident > _LAST_STANDARD
-    bytes_name = f"{name}.DataBytes"
-    held = fields[bytes_name] if bytes_name in fields.dtype.names else np.zeros((count, SHORT), dtype=np.uint8)
-    held = np.atleast_2d(held)
-    length = column("DataLength") if kind == 0 else column("DLC")
-    length = np.where(kind == ERROR, 0, np.minimum(length, held.shape[1] if kind == 0 else LONG))
-    rows = np.flatnonzero(length > SHORT)
-    flags = sum(
-        np.where(column(what) != 0, bit, 0) for what, bit in (("EDL", FD), ("BRS", RATE_SWITCH), ("ESI", ERROR_STATE))
-    )
-    return frames(
-        np.rint(np.asarray(records.timestamps, dtype=np.float64) * 1e9),
-        np.where(kind == ERROR, 0, (ident & IDENTIFIER) | np.where(extended, EXTENDED, 0)),
-        column("BusChannel"),
-        kind | flags | np.where(column("Dir") != 0, SENT, 0),
-        length,
-        _fitted(held[:, :SHORT], length, SHORT),
-        rows,
-        _fitted(held[rows], length[rows], LONG),
-    )
+def _merged(times: Sequence[Int64]) -> Rows:
+    """Order of all rows by their stamps that keeps the order of each group, also where its time goes back: a log that
+    restarts must show."""
+    return np.argsort(np.concatenate([np.maximum.accumulate(time) for time in times]), kind="stable")
 
 
-def _fitted(data: ByteMatrix, length: Any, width: int) -> ByteMatrix:
-    """(n, width) of (n, any) bytes, zeros beyond each frame's `length` (n,)."""
-    out = np.zeros((len(data), width), dtype=np.uint8)
-    out[:, : data.shape[1]] = data[:, :width]
-    short = np.flatnonzero(length < min(width, data.shape[1]))
-    out[short] = np.where(np.arange(width) < length[short, None], out[short], 0)
-    return out
+def _part(log: Any, index: int, name: str, kind: int, losses: Losses) -> Frames:
+    """Frames of one group: from its records, or by asammdf where these are not as usual."""
+    found = layout(log._mdf, index, name)
+    if found is None:
+        return by_asammdf(log, index, name, kind, losses)
+    return read_group(log._mdf, index, kind, found, losses)

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nineaudit.readers.inflate import inflate
 from nineaudit.readers.mcap.parse import (
     MESSAGE,
     MESSAGE_HEAD,
@@ -25,12 +26,6 @@ from nineaudit.readers.mcap.parse import (
     records,
 )
 
-LARGEST: Final = 2**30
-"""Bytes of the largest chunk that is inflated."""
-_RATIO: Final = {"zstd": 2**16, "lz4": 2**9}
-"""No data inflate to more than this many times their size: of zstd a block of 128 KiB is 4 bytes or more, of LZ4 one
-byte stands for 255 or fewer."""
-
 
 def inflated(chunk: Chunk, data: Data) -> Data:
     """The chunk's records, CRC verified. Raises Malformed: an unknown compression, a size that is not the stated one
@@ -38,41 +33,17 @@ def inflated(chunk: Chunk, data: Data) -> Data:
     packed = data[chunk.start : chunk.end]
     if chunk.compression == "":
         found = packed
-    elif chunk.compression in _RATIO:
-        if chunk.size > min(LARGEST, _RATIO[chunk.compression] * (len(packed) + 64)):
-            raise Malformed("a chunk that states more bytes than it can hold")
-        found = (_zstd if chunk.compression == "zstd" else _lz4)(packed, chunk.size)
+    elif chunk.compression in ("zstd", "lz4"):
+        try:
+            found = inflate(chunk.compression, packed, chunk.size)
+        except ValueError as error:
+            raise Malformed(f"a chunk that {error}") from error
     else:
         raise Malformed("a chunk in an unknown compression")
     if len(found) != chunk.size:
         raise Malformed("a chunk that is not of the size it states")
     if chunk.crc and zlib.crc32(found) != chunk.crc:
         raise Malformed("a chunk whose checksum (CRC) does not hold")
-    return found
-
-
-def _zstd(packed: Data, size: int) -> bytes:
-    import zstandard
-
-    try:
-        stated = zstandard.frame_content_size(packed)
-        if stated not in (-1, size):
-            raise Malformed("a chunk that is not of the size it states")
-        return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size) if size else b""
-    except (zstandard.ZstdError, MemoryError) as error:
-        raise Malformed("a chunk that does not inflate") from error
-
-
-def _lz4(packed: Data, size: int) -> bytes:
-    import lz4.frame
-
-    decoder = lz4.frame.LZ4FrameDecompressor()
-    try:
-        found = bytes(decoder.decompress(packed, max_length=size + 1))
-    except (RuntimeError, MemoryError, EOFError) as error:  # the library has no error of its own
-        raise Malformed("a chunk that does not inflate") from error
-    if not decoder.eof:
-        raise Malformed("a chunk that does not inflate")
     return found
 
 
