@@ -16,3 +16,6 @@ campaign_app = group(
 @campaign_app.callback()
 def _campaign() -> None:
     pass
+
+
+from nineaudit.campaign import table_commands  # noqa: E402, F401  (registers on it)

@@ -1,0 +1,107 @@
+"""The commands `campaign compact`, `query`, `diff` and `report`: what the results of a lake say together.
+
+They return what is to be printed, with the exit code. Heavy modules are imported inside the functions.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from nineaudit.campaign.commands import campaign_app
+from nineaudit.options import example
+
+if TYPE_CHECKING:
+    from nineaudit.campaign.compact import Compaction
+
+LakeOption = Annotated[str, typer.Argument(metavar="LAKE", help="A folder, s3://bucket/lake, any place of fsspec.")]
+Edition = Annotated[
+    str | None, typer.Option("--edition", metavar="E", help="Rules and tool; default: those of the newest run.")
+]
+DiffFormat = StrEnum("DiffFormat", ["text", "json"])
+QueryFormat = StrEnum("QueryFormat", ["table", "csv", "json", "parquet"])
+DAMAGED = 3
+"""Exit code where an entry of the lake cannot be used."""
+Ended = tuple[list[str], int]
+
+
+@campaign_app.command("compact", epilog=example("nineaudit campaign compact lake"))
+def compact(lake: LakeOption, edition: Edition = None) -> Ended:
+    """Make the tables (Parquet) of a lake from its results.
+
+    The same results give the same bytes. Exit code 3 where a result is damaged: it is named and left out.
+    """
+    from nineaudit.campaign import compact as compacting
+    from nineaudit.campaign.lake import open_lake
+
+    return _compacted(compacting.compact(open_lake(lake), edition))
+
+
+def _compacted(done: Compaction) -> Ended:
+    from nineaudit.campaign import schema
+    from nineaudit.report.numbers import printable
+
+    wrong = [f"{printable(one.place)}: left out: {printable(one.why)}" for one in done.damaged]
+    left = f"; {len(wrong)} left out" if wrong else ""
+    said = f"{done.recordings} recordings of edition {done.edition}{left}: tables {', '.join(schema.TABLES)}"
+    return [*wrong, said], DAMAGED if wrong else 0
+
+
+@campaign_app.command(
+    "query",
+    epilog=example(
+        'nineaudit campaign query lake "SELECT verdict, count(*) FROM recordings GROUP BY verdict"',
+        'nineaudit campaign query lake "DESCRIBE findings"',
+    ),
+)
+def query(
+    lake: LakeOption,
+    sql: Annotated[str, typer.Argument(metavar="SQL", help="One SELECT; it can change nothing and read nothing else.")],
+    format: Annotated[QueryFormat | None, typer.Option(help="Default: a table, or by the suffix of --output.")] = None,
+    output: Annotated[Path | None, typer.Option(metavar="F", help="Write the answer to this file.")] = None,
+) -> Ended:
+    """Ask the tables of a lake in SQL (DuckDB): recordings, findings, candidates, sensors, provenance."""
+    from nineaudit.campaign import answers
+    from nineaudit.campaign.compact import stored
+    from nineaudit.campaign.lake import open_lake
+    from nineaudit.campaign.query import select
+    from nineaudit.outputs import write_text
+
+    style = answers.style(format, output)
+    answer = select(stored(open_lake(lake)).tables, sql)
+    if output is None:
+        return [answers.as_text(answer, style, shutil.get_terminal_size((200, 24)).columns)], 0
+    if style == "parquet":
+        answers.write_parquet(answer, output)
+    else:
+        write_text(output, answers.as_text(answer, style) + "\n")
+    return [f"{output}: {answer.num_rows} rows"], 0
+
+
+@campaign_app.command(
+    "diff",
+    epilog=example(
+        "nineaudit campaign diff lake-before lake",
+        "nineaudit campaign diff lake@0123456789ab lake --format json",
+    ),
+)
+def diff(
+    base: Annotated[str, typer.Argument(metavar="BASE", help="LAKE or LAKE@EDITION.")],
+    head: Annotated[str, typer.Argument(metavar="HEAD", help="LAKE or LAKE@EDITION.")],
+    format: Annotated[DiffFormat, typer.Option(help="Of standard output.")] = DiffFormat.text,
+) -> Ended:
+    """What changed between two lakes, or two editions (rules and tool) of one: verdicts, culprits, rules.
+
+    Exit code 0 where nothing did, 1 where something did, 3 where a result is damaged.
+    """
+    from nineaudit.campaign import diff as comparing
+
+    found = comparing.difference(comparing.side(base), comparing.side(head))
+    if format == DiffFormat.json:
+        return [json.dumps(comparing.document(found), indent=2, ensure_ascii=False)], found.exit_code
+    return comparing.lines(found), found.exit_code
