@@ -29,6 +29,8 @@ UNEXPLAINED = 1.5
 """Cost per degree of freedom, over the best, that even the best hypothesis may leave before it explains nothing."""
 UNSAID = 0.01
 """Part of the cost that what no budget says may move from one hypothesis to another: it must not name a twin."""
+UNTOLD = 0.002
+"""The same as a part of the evidence, between two faults that both leave little unexplained."""
 DECISIVE = ("dropout", "stuck", "spikes")
 """Faults that a trace shows beyond doubt."""
 WAVEFORMS = ("unknown", "samples")
@@ -156,7 +158,9 @@ def _group(search: Search, best: Hypothesis, floor: float) -> list[tuple[int, ..
     """The best channel, and every other that nothing sets apart from it."""
     scores = _scores(search)
     odds = ODDS_NATS if len(best.channels) == 1 or best.word == "swap" else FAR
-    near = [c for c, score in scores.items() if scores[best.channels] - score < odds]
+    whole = {x.channels for x in search.found if x.statistic <= UNEXPLAINED * floor}
+    untold = UNTOLD * scores[best.channels]
+    near = [c for c, score in scores.items() if scores[best.channels] - score < odds + untold * (c in whole)]
     if len(best.channels) == 1 and best.channels[0] in search.without and _is_waveform(search, best):
         channel, data = best.channels[0], search.healthy.data
         mine, needed = search.without[channel], _separation(data)

@@ -139,6 +139,9 @@ def _closely(
     shapes += [(x, left) for x in h.curves(data, left, channel, onset, reference, large)]
     shapes.sort(key=lambda pair: -pair[0].evidence)
     likely = [pair for pair in shapes[:CONFIRMED] if pair[0].evidence > shapes[0][0].evidence - CLOSE_NATS]
+    # evidence about the fit without the channel may promise too much: it must not keep the best of the other out
+    mine = [x for x, near in shapes if near is healthy and x.evidence > WORTH_NATS][:1]
+    likely += [(x, healthy) for x in mine if all(x is not other for other, _ in likely)]
     found = [h.confirm(data, near, x, reference) for x, near in likely]
     found.append(refitted.any_waveform(data, left, channel, reference))
     # where a small gain mends the record, a large one is the same
