@@ -147,7 +147,7 @@ def test_twins_that_explain_a_record_almost_alike_are_a_group():
 
 
 def test_the_best_of_the_small_faults_is_always_looked_at():
-    """A shift, of which the fit without the channel promised too much, had kept the true place from a fit of its own."""
+    """A shift of which another fit promised too much had kept the true place from a fit of its own."""
     found = answer("triax-3", "general", "a2x:position=10mm", 3202)
     assert found.channels == ("a2x",)
     assert found.candidates[0].fault == "position"
