@@ -206,8 +206,14 @@ def versions() -> dict[str, str]:
 
 
 def _words(case: Case) -> dict[str, str]:
-    """Channel -> fault word, where its own trace shows one."""
-    return {found.channel: found.fault for found in case.evidence if found.fault is not None}
+    """Channel -> fault word, where its own trace, as far as it was measured, shows one."""
+    made = case.recording.made_of_others
+    only_made = np.logical_and((case.flagged & made).any(axis=0), ~(case.flagged & ~made).any(axis=0))
+    return {
+        x.channel: x.fault
+        for x, of_made in zip(case.evidence, only_made.tolist(), strict=True)
+        if x.fault is not None and not of_made
+    }
 
 
 def _repair(case: Case, diagnosis: Diagnosis) -> Reconstruction | None:

@@ -1,7 +1,7 @@
 """A recording with what every check needs of it, each computed once.
 
-The zero of a channel is its mean over the quiet interval before the event (SAE J1727); the mean of the gravity
-that the accelerometers see there goes with it, which the constraints do not feel (METHODS.md 1).
+Readings that a repair made of the other channels agree with those whatever happened: no residual and no fit that holds
+channels against each other counts them. They stand in for the channel only where all of them are needed to integrate ω.
 """
 
 from __future__ import annotations
@@ -21,94 +21,21 @@ from nineaudit.estimate.functional import smoothed
 from nineaudit.estimate.hypotheses import healthy_fit
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import Motion, bridge, estimate_motion, has_rates, product_free, resampled
-from nineaudit.estimate.quiet import Quiet, find_quiet, noise_level
 from nineaudit.estimate.search import Search, search
-from nineaudit.estimate.single_channel import ChannelEvidence, find_evidence, flagged
 from nineaudit.estimate.start import make_data
 from nineaudit.estimate.student import StudentFit, first_fit
 from nineaudit.estimate.suspects import Suspect, suspects
 from nineaudit.estimate.trajectory import Fit
 from nineaudit.physics import filters, nap
-from nineaudit.recording import Recording
+from nineaudit.zeroed import Zeroed
 
 CFC_TO_PASS_BAND = 0.6
 """CFC number over its −3 dB frequency: the class is 1000 for 1650 Hz (SAE J211-1)."""
-NOMINAL_NOISE = 1e-3
-"""Last resort for a noise level, as a part of the channel's peak, where neither rig nor recording tells."""
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Case(Zeroed):
     """`recording` and its derived quantities; SI, columns in the order of ``recording.rig.array``."""
-
-    recording: Recording
-
-    @property
-    def array(self) -> SensorArray:
-        return self.recording.rig.array
-
-    @property
-    def time(self) -> FloatArray:
-        """(n,) s."""
-        return self.recording.time
-
-    @cached_property
-    def rest(self) -> Quiet | None:
-        """The quiet interval: the rig's pre_trigger, or the quietest stretch that looks like rest, or None."""
-        stated = self.recording.rig.pre_trigger
-        noise, anywhere = self.array.values("noise"), has_rates(self.array)
-        return find_quiet(self.time, self.recording.readings, noise, stated, anywhere)
-
-    @property
-    def required_rest(self) -> Quiet:
-        """The quiet interval; EstimationError where there is none."""
-        if self.rest is None:
-            raise EstimationError(
-                "no quiet interval was found",
-                advice="state [recording] pre_trigger in the rig file, with the body at rest",
-            )
-        return self.rest
-
-    @cached_property
-    def zero(self) -> FloatArray:
-        """(k,) mean over the quiet interval; 0 where there is none, or no valid sample in it."""
-        if self.rest is None:
-            return np.zeros(len(self.array))
-        window = self.recording.readings[self.rest.samples]
-        count = np.isfinite(window).sum(axis=0)
-        return np.asarray(np.nansum(window, axis=0) / np.maximum(count, 1))
-
-    @cached_property
-    def readings(self) -> FloatArray:
-        """(n,k) with the zero taken off; NaN where invalid."""
-        return np.asarray(self.recording.readings - self.zero)
-
-    @property
-    def valid(self) -> BoolArray:
-        """(n,k)"""
-        return self.recording.valid
-
-    @cached_property
-    def sigma(self) -> FloatArray:
-        """(k,) deviation of a reading in the fits: `noise`, and more for channels of other clocks (Alignment)."""
-        found = self.noise.copy()
-        for a in (a for a in self.recording.alignments if a.channel in self.array.channels):
-            found[self.array.index(a.channel)] = a.deviation(found[self.array.index(a.channel)])
-        return found
-
-    @cached_property
-    def noise(self) -> FloatArray:
-        """(k,) noise standard deviation: the rig's, else measured in the quiet interval, else from differences.
-
-        Never below a quarter of the channel's quantisation step over √3 (uniform rounding noise, GUM F.2.2.1
-        gives step/√12), so that no weight is infinite.
-        """
-        stated = self.array.values("noise")
-        measured = noise_level(self.recording.readings, None if self.rest is None else self.rest.samples)
-        with np.errstate(invalid="ignore"):
-            peak = np.nan_to_num(np.nanmax(np.abs(self.readings), axis=0, initial=0.0))
-        floor = np.maximum(NOMINAL_NOISE * peak, 1e-9)
-        return np.where(np.isfinite(stated) & (stated > 0), stated, np.where(measured > 0, measured, floor))
 
     @cached_property
     def motion(self) -> Motion:
@@ -123,16 +50,6 @@ class Case:
         omega, alpha, a0 = (resampled(v, blocks, self.time) for v in (found.omega, found.alpha, found.a0))
         return Motion(omega, alpha, a0, found.method)
 
-    @cached_property
-    def evidence(self) -> tuple[ChannelEvidence, ...]:
-        """What each channel's own trace shows: flat tops, dropouts, stuck stretches, spikes."""
-        return find_evidence(self.recording, self.sigma)
-
-    @cached_property
-    def flagged(self) -> BoolArray:
-        """(n,k) samples of the common time base that the evidence speaks of."""
-        return flagged(self.recording, self.evidence)
-
     def with_readings(self, channels: Sequence[str], readings: FloatArray) -> Case:
         """The same recording with other readings (n,m) SI, zero taken off, in some channels."""
         columns = [self.array.index(c) for c in channels]
@@ -146,8 +63,14 @@ class Case:
         return self._condense(self.readings)
 
     @cached_property
+    def made_blocks(self) -> BoolArray:
+        """(m,k) blocks of `condensed` that hold a sample made of other channels."""
+        return condense.marked_blocks(self.recording.made_of_others, self.condensed.length)
+
+    @cached_property
     def parity(self) -> parity_of.Residual:
-        """Residual of every channel against the array, on the blocks of `condensed`, all samples at their word."""
+        """Residual of every channel against the array, on the blocks of `condensed`, all measured samples at their
+        word."""
         return self._parity(self.condensed)
 
     @cached_property
@@ -156,8 +79,10 @@ class Case:
         return self._parity(self._condense(np.where(self.flagged, np.nan, self.readings)))
 
     def _parity(self, blocks: condense.Condensed) -> parity_of.Residual:
-        motion = self._motion_of(self.array, blocks)
-        return parity_of.channel_residuals(self.array, blocks.time, blocks.readings, blocks.sigma, motion)
+        readings = np.where(self.made_blocks & ~self.array.is_accelerometer, np.nan, blocks.readings)
+        motion = self._motion_of(self.array, replace(blocks, readings=readings))
+        at = self.array, blocks.time, blocks.readings, blocks.sigma, motion
+        return parity_of.measured_residuals(*at, self.made_blocks)
 
     @cached_property
     def alpha_budget(self) -> budget.AlphaBudget:
@@ -201,7 +126,7 @@ class Case:
         if self.rest is not None:
             rest = (self.rest.start // self.condensed.length, self.rest.stop // self.condensed.length)
         data = make_data(self.array, self.condensed, rest)
-        made = condense.marked_blocks(self.recording.made_of_others, self.condensed.length)
+        made = self.made_blocks
         return replace(data, weight=np.where(made, 0.0, data.weight)) if made.any() else data
 
     @property

@@ -124,11 +124,11 @@ def _apply(rule: Rule, check: Check, case: Case, units: UnitNames) -> list[Findi
 
 
 def _with_made(finding: Finding, case: Case) -> Finding:
-    """The finding; where it compares channels and one of them was made of the others, it says so."""
+    """The finding; where it compares channels and one of them was made of the others, it says what is left out."""
     made = dict.fromkeys(made.channel for made in case.recording.remade if made.from_others)
     if not made or finding.measure is None or not finding.rule.startswith(_COMPARING):
         return finding
-    said = f"{finding.reason}; where {', '.join(made)} was made of the other channels, it is no evidence"
+    said = f"{finding.reason}; samples of {', '.join(made)} that were made of the other channels are left out"
     return finding.with_verdict(finding.verdict, said)
 
 

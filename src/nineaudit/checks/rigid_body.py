@@ -7,16 +7,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from nineaudit.array import BoolArray
 from nineaudit.case import Case
+from nineaudit.errors import EstimationError
 from nineaudit.estimate import closed_form, parity
 from nineaudit.estimate.motion import has_rates, product_free
 from nineaudit.estimate.quiet import noise_level
 from nineaudit.estimate.search import FEW_CHANNELS
 from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.finding import COVERAGE_FACTOR, Measure, NotApplicable
+from nineaudit.physics import nap
 
 COARSE = 5.0
 """Second differences over the noise above which knocks pass between the samples: no single one proves a fault."""
+MOST = 0.5
+"""Part of the event in which something must be tested, where samples made of other channels are left out."""
 AXES = ("ωyωz", "ωzωx", "ωxωy")
 
 
@@ -30,11 +35,15 @@ def constraint_equations(case: Case, *, false_alarm: float) -> tuple[Measure, ..
     if problem is None:
         return NotApplicable("the array holds no ideal 3-2-2-2 layout; RB302 tests its general parity")
     residual, noise, budget = closed_form.constraint_budget(problem)
-    factor = parity.budget_factor(false_alarm, residual.size)
+    measured = _measured_constraints(case, problem)
+    axes = [axis for axis in range(3) if _enough(case, measured[:, axis])]
+    if not axes:
+        raise EstimationError(f"no constraint has only measured channels in most of the event: {_made(case)}")
+    factor = parity.budget_factor(false_alarm, int(measured[:, axes].sum()))
     found = []
-    for axis in range(3):
+    for axis in axes:
         scale = 2.0 * np.sqrt(np.abs(np.prod(np.delete(problem.arms, axis))))
-        worst = int(np.argmax(np.abs(residual[:, axis]) / budget[:, axis]))
+        worst = int(np.argmax(np.where(measured[:, axis], np.abs(residual[:, axis]) / budget[:, axis], -1.0)))
         found.append(
             Measure(
                 value=float(scale * abs(residual[worst, axis])),
@@ -48,6 +57,24 @@ def constraint_equations(case: Case, *, false_alarm: float) -> tuple[Measure, ..
     return tuple(found)
 
 
+def _measured_constraints(case: Case, problem: closed_form.Problem) -> BoolArray:
+    """(n,3) where no channel of a constraint was made of the others: such a channel fulfils it by construction."""
+    assert case.nap_layout is not None
+    made = case.made_blocks[:, list(case.nap_layout[0])]
+    return np.asarray(~(made @ (nap.product_rows(problem.arms) != 0).T))
+
+
+def _enough(case: Case, tested: BoolArray) -> bool:
+    """Whether what is tested, (n,) blocks, is most of the event: rest alone shows no fault."""
+    return not case.made_blocks.any() or bool(tested[case.onset :].mean() > MOST)
+
+
+def _made(case: Case) -> str:
+    """Which channels are no measurement."""
+    names = tuple(dict.fromkeys(made.channel for made in case.recording.remade if made.from_others))
+    return f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} made of the other channels"
+
+
 def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
     """RB302: every channel against the least-squares fit of the whole array, (I − HH⁺)(y − q(ω)) [METHODS 2]."""
     if by_student(case) and _unresolved(case) > COARSE:
@@ -57,6 +84,8 @@ def array_parity(case: Case, *, false_alarm: float) -> Measure | NotApplicable:
         return NotApplicable(_nothing_to_spare(case))
     if not (has_rates(case.array) or product_free(case.array)):
         return NotApplicable("without rate sensors α of this layout is not free of ω; RB303 tests the whole record")
+    if not _enough(case, np.asarray(np.isfinite(case.parity.value).any(axis=1))):
+        raise EstimationError(f"too few channels are left to hold against each other in the event: {_made(case)}")
     worst = parity.worst(case.parity, false_alarm)
     sensor = case.array.sensors[worst.column]
     time = float(case.condensed.time[worst.row])

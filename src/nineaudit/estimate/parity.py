@@ -11,11 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nineaudit.array import FloatArray, SensorArray
+from nineaudit.array import BoolArray, FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate import calibration
 from nineaudit.estimate.motion import OFF_IDEAL, Motion, bridge, has_rates
 from nineaudit.physics import kinematics, rigid_body
+
+NOTHING = 1e-9
+"""Part of a channel that others contradict, below which it is rounding."""
 
 
 def redundancy(array: SensorArray) -> tuple[int, int]:
@@ -41,7 +44,7 @@ def redundant(array: SensorArray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Per channel: `value` (n,k) the disagreement, `noise` (k,) its standard deviation from noise alone, and
+    """Per channel: `value` (n,k) the disagreement, `noise` (n,k) its standard deviation from noise alone, and
     `budget` (n,k) its standard deviation from noise and calibration together; SI, NaN where not evaluated."""
 
     value: FloatArray
@@ -49,36 +52,61 @@ class Residual:
     budget: FloatArray
 
 
-def channel_residuals(
-    array: SensorArray, time: FloatArray, readings: FloatArray, sigma: FloatArray, motion: Motion
+def measured_residuals(
+    array: SensorArray, time: FloatArray, readings: FloatArray, sigma: FloatArray, motion: Motion, made: BoolArray
 ) -> Residual:
-    """Residual of every channel against the whole array, with its error budget.
+    """As channel_residuals, of what was measured: where readings are `made` (n,k) of other channels, the rest of the
+    array is held against itself, and they have no residual."""
+    patterns, which = np.unique(made, axis=0, return_inverse=True)
+    found = channel_residuals(array, time, readings, sigma, motion, ~patterns[0])
+    for p, pattern in enumerate(patterns[1:], 1):
+        rows = (which.ravel() == p)[:, None]
+        other = channel_residuals(array, time, readings, sigma, motion, ~pattern)
+        found = Residual(
+            np.where(rows, other.value, found.value),
+            np.where(rows, other.noise, found.noise),
+            np.where(rows, other.budget, found.budget),
+        )
+    return found
+
+
+def channel_residuals(
+    array: SensorArray,
+    time: FloatArray,
+    readings: FloatArray,
+    sigma: FloatArray,
+    motion: Motion,
+    used: BoolArray | None = None,
+) -> Residual:
+    """Residual of every channel against the whole array, or of the `used` (k,) ones against each other, with its error
+    budget.
 
     `readings` (n,k) SI zeroed (NaN invalid), `sigma` (k,) noise, `motion` from the same readings. A sample with
     an invalid channel is NaN in every channel it takes part with, and so is one at which ω is
     not known. Channels without redundancy are NaN.
     """
-    accelerometers = np.flatnonzero(array.is_accelerometer)
-    gyros = np.flatnonzero(~array.is_accelerometer)
-    spare_a, spare_g = redundancy(array)
-    value = np.full(readings.shape, np.nan)
-    noise, variance = np.full(len(array), np.nan), np.zeros(readings.shape)
-    filled = bridge(readings, time)
-    patterns = calibration.all_columns(array, filled, time, motion)
-    if spare_a:
-        positions, axes = array.positions[accelerometers], array.axes[accelerometers]
-        projector = _projector(rigid_body.design(positions, axes))
+    held = np.ones(len(array), dtype=np.bool_) if used is None else used
+    accelerometers, gyros = np.flatnonzero(array.is_accelerometer), np.flatnonzero(~array.is_accelerometer)
+    value, variance = np.full(readings.shape, np.nan), np.zeros(readings.shape)
+    noise = np.full(readings.shape, np.nan)
+    patterns = calibration.all_columns(array, bridge(readings, time), time, motion)
+    readings = np.where(held, readings, 0.0)
+    positions, axes = array.positions[accelerometers], array.axes[accelerometers]
+    projector = _projector(rigid_body.design(positions, axes), held[accelerometers])
+    if projector.any():
         y = readings[:, accelerometers] - rigid_body.centripetal(positions, axes, motion.omega)
         value[:, accelerometers] = y @ projector.T
         if motion.known is not None:
             value[np.ix_(~motion.known, accelerometers)] = np.nan
-        noise[accelerometers] = np.sqrt(projector**2 @ sigma[accelerometers] ** 2)
-        variance[:, accelerometers] = _accelerometer_budget(array, time, motion, patterns, projector, sigma)
-    if spare_g > 0:
-        projector = _projector(array.axes[gyros])
-        value[:, gyros] = readings[:, gyros] @ projector.T
-        noise[gyros] = np.sqrt(projector**2 @ sigma[gyros] ** 2)
-        variance[:, gyros] = np.einsum("ij,jnp->ni", projector**2, patterns[gyros] ** 2)
+        noise[:, accelerometers] = np.sqrt(projector**2 @ sigma[accelerometers] ** 2)
+        variance[:, accelerometers] = _accelerometer_budget(array, time, motion, patterns, projector, sigma, held)
+        value[:, accelerometers[~projector.any(axis=1)]] = np.nan
+    spare = _projector(array.axes[gyros], held[gyros])
+    if spare.any() and has_rates(array):
+        value[:, gyros] = readings[:, gyros] @ spare.T
+        noise[:, gyros] = np.sqrt(spare**2 @ sigma[gyros] ** 2)
+        variance[:, gyros] = np.einsum("ij,jnp->ni", spare**2, patterns[gyros] ** 2)
+        value[:, gyros[~spare.any(axis=1)]] = np.nan
     return Residual(value, noise, np.sqrt(variance + noise**2))
 
 
@@ -116,13 +144,20 @@ def worst(residual: Residual, false_alarm: float) -> Worst:
         int(row),
         float(abs(residual.value[row, column])),
         float(factor * residual.budget[row, column]),
-        float(residual.noise[column]),
+        float(residual.noise[row, column]),
     )
 
 
-def _projector(design: FloatArray) -> FloatArray:
-    """I − H H⁺ (k,k), onto what no motion can explain."""
-    return np.eye(len(design)) - design @ np.linalg.pinv(design)
+def _projector(design: FloatArray, used: BoolArray) -> FloatArray:
+    """I − H H⁺ (k,k) of the used rows, onto what no motion can explain; 0 for the others and for a row that no other
+    contradicts."""
+    out = np.zeros((len(design), len(design)))
+    if used.any():
+        rows = design[used]
+        found = np.eye(len(rows)) - rows @ np.linalg.pinv(rows)
+        free = np.diag(found) > NOTHING
+        out[np.ix_(used, used)] = np.where(np.outer(free, free), found, 0.0)
+    return out
 
 
 def _accelerometer_budget(
@@ -132,6 +167,7 @@ def _accelerometer_budget(
     patterns: FloatArray,
     projector: FloatArray,
     sigma: FloatArray,
+    used: BoolArray,
 ) -> FloatArray:
     """(n,a) variance of the accelerometers' residuals from calibration errors and from the noise in ω.
 
@@ -143,7 +179,7 @@ def _accelerometer_budget(
     variance = np.zeros((len(time), len(accelerometers)))
     rates = has_rates(array)
     if rates:
-        gyros = np.flatnonzero(~array.is_accelerometer)
+        gyros = np.flatnonzero(~array.is_accelerometer & used)
         gain = np.linalg.pinv(array.axes[gyros] / sigma[gyros, None]) / sigma[gyros]
         for j, g in enumerate(gyros):
             through = feed @ gain[:, j]

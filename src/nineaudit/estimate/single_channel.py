@@ -75,7 +75,7 @@ class ChannelEvidence:
 def find_evidence(recording: Recording, sigma: FloatArray) -> tuple[ChannelEvidence, ...]:
     """The evidence of every channel, in the order of the array; `sigma` (k,) noise standard deviation, SI."""
     floors = np.maximum(sigma, [resolution(column) for column in recording.readings.T])
-    jolted = _jolts(recording.readings, floors)
+    jolted = _jolts(recording.readings, floors) & ~recording.made_of_others
     traces = {trace.channel: trace for trace in recording.native}
     return tuple(
         _of_channel(recording, traces[name], i, sigma, floors, jolted) for i, name in enumerate(recording.channels)
