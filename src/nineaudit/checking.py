@@ -187,7 +187,7 @@ def run(
         if file is not None:
             write_text(file, _collected(kind, kept, fail_on))
     if many:
-        say(_tally(verdicts))
+        say(tally(verdicts))
     return code
 
 
@@ -235,7 +235,7 @@ def _collected(kind: str, outcomes: Sequence[Outcome], fail_on: str) -> str:
     return (report.github if kind == "github" else report.markdown)(audits, unread)
 
 
-def _tally(verdicts: Mapping[str, int]) -> str:
+def tally(verdicts: Mapping[str, int]) -> str:
     """``12 recordings: 2 fail, 1 not audited, 9 pass``."""
     parts = ", ".join(f"{n} {verdict.replace('_', ' ')}" for verdict, n in sorted(verdicts.items()))
     return f"{sum(verdicts.values())} recordings: {parts}"

@@ -244,8 +244,11 @@ def _printing(command: Callable[P, tuple[list[str], int]]) -> Callable[P, None]:
     return run
 
 
-def _ended(done: str | tuple[list[str], int]) -> None:
-    """Print what a command returned, its text or its lines, and exit with its code."""
+def _ended(done: str | tuple[list[str], int] | Callable[[progress.Show, progress.Show], int]) -> None:
+    """Print what a command returned, its text or its lines, and exit with its code; or run what it returned, which
+    shows results and says the rest as it goes."""
+    if callable(done):
+        raise typer.Exit(done(typer.echo, _say))
     lines, code = ([done], 0) if isinstance(done, str) else done
     _print(lines)
     raise typer.Exit(code)

@@ -20,8 +20,11 @@ def wanted(total: int, terminal: bool, environment: Mapping[str, str] = os.envir
     return total > 1 and terminal and not environment.get("CI") and environment.get("TERM") != "dumb"
 
 
-def along(items: Iterable[T], total: int, shows: Sequence[Show]) -> tuple[Iterable[T], list[Show]]:
+def along(
+    items: Iterable[T], total: int, shows: Sequence[Show], *, rate: bool = False
+) -> tuple[Iterable[T], list[Show]]:
     """The items with a bar on standard error that counts them, and each of `shows` so that the bar is away meanwhile.
+    With `rate` it says how many there are in a second.
 
     Colours follow NO_COLOR. The bar is gone at the end, and after Ctrl-C.
     """
@@ -30,6 +33,8 @@ def along(items: Iterable[T], total: int, shows: Sequence[Show]) -> tuple[Iterab
 
     console = Console(stderr=True)
     columns: list[Any] = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()]
+    if rate:
+        columns.insert(3, TextColumn("{task.fields[rate]}"))
     bar = Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False)
 
     return _counted(items, total, bar), [partial(_aside, bar, show) for show in shows]
@@ -41,11 +46,13 @@ def _aside(bar: Progress, show: Show, text: str) -> None:
 
 
 def _counted(items: Iterable[T], total: int, bar: Progress) -> Iterator[T]:
-    task = bar.add_task("recordings", total=total)
+    task = bar.add_task("recordings", total=total, rate="")
     with bar:
         for item in items:
             yield item
             bar.advance(task)
+            speed = bar.tasks[0].speed
+            bar.update(task, rate="" if speed is None else f"{speed:.3g}/s")
 
 
 @contextmanager

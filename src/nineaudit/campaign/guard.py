@@ -36,6 +36,9 @@ class Limits:
     retries: int = 2
 
 
+NO_LIMITS: Final = Limits()
+
+
 class Lost(Exception):
     """The process of an audit ended without an answer. `again`: it may be otherwise the next time."""
 

@@ -41,6 +41,8 @@ class Setting:
     waivers: tuple[Waiver, ...] | None
     dbc: tuple[Path, ...]
     folder: Path
+    held: tempfile.TemporaryDirectory[str]
+    """The folder goes with the setting."""
 
     @property
     def edition(self) -> str:
@@ -103,7 +105,7 @@ def load(document: Document, rig: str | None = None) -> Setting:
         raise ConfigurationError(str(error).replace(str(error.file), rig)) from error
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def _loaded(text: str) -> Setting:
     from nineaudit.checking import load_book
     from nineaudit.rig import load_rig
@@ -124,12 +126,7 @@ def _loaded(text: str) -> Setting:
     book = load_book(rules, document["select"], document["ignore"])
     given = document["waivers"]
     waivers = None if given is None else load_waivers(_put(folder / given["name"], given), load_book(rules).codes)
-    _KEPT.append(held)
-    return Setting(document, rig, book, waivers, dbc, folder)
-
-
-_KEPT: list[tempfile.TemporaryDirectory[str]] = []
-"""Folders of settings that are in use: they go with the process."""
+    return Setting(document, rig, book, waivers, dbc, folder, held)
 
 
 def _databases(data: bytes) -> list[str]:

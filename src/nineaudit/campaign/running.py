@@ -1,0 +1,164 @@
+"""Many audits on Dask: a bounded window of tasks; entries are written where the audits are made, not here.
+
+So that this process holds no results, and nothing that was finished is lost with it, with a worker or the scheduler.
+"""
+
+from __future__ import annotations
+
+import logging
+import socket
+import time
+import uuid
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from nineaudit.campaign.guard import FUNCTION, NO_LIMITS, Limits, guarded
+from nineaudit.campaign.requests import Request, give_up
+from nineaudit.errors import ConfigurationError, NineauditError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+    from nineaudit.campaign.task import Summary
+
+LOCAL: Final = "local"
+_AHEAD: Final = 2
+"""Tasks in flight for each thread of the workers: the next one is there when one ends."""
+_COUNTED: Final = 2.0
+"""Seconds after which the workers are counted again: a cluster may grow."""
+_PATIENCE: Final = "30s"
+
+
+class SchedulerLost(NineauditError):
+    """The scheduler went away; what was finished is in the lake (exit code 3)."""
+
+
+def run(
+    requests: Iterable[Request],
+    scheduler: str = LOCAL,
+    workers: int | None = None,
+    limits: Limits = NO_LIMITS,
+    function: str = FUNCTION,
+) -> Iterator[Summary]:
+    """The summary of each request, as they are done: uri, key, verdict, gate, kept, and what varies (seconds, host,
+    attempts).
+
+    `scheduler`: ``local`` (with `workers` processes; default: one a core), an address (``tcp://...``) or a scheduler
+    file. `function` (``module:name``) does the work, in a process of its own. A recording whose worker dies is tried
+    again by Dask, at last alone, then written as not audited. ConfigurationError: no such scheduler; SchedulerLost.
+    """
+    with _client(scheduler, workers, limits) as client:
+        suspects: list[Request] = []
+        yield from _windowed(client, iter(requests), limits, function, suspects)
+        for request in suspects:  # one at a time: who dies now dies by its own recording
+            again: list[Request] = []
+            yield from _windowed(client, iter([request]), limits, function, again)
+            for one in again:
+                reason = f"every worker that audited it died ({limits.retries + 1} of them, then as many again)"
+                yield {**give_up(one, reason), "attempts": 2 * (limits.retries + 1)}
+
+
+def perform(request: Request, limits: Limits, function: str) -> Summary:
+    """On a worker: the request in a process of its own, and how long it took where."""
+    began = time.perf_counter()
+    done = guarded(request, limits, function)
+    return {**done, "seconds": round(time.perf_counter() - began, 3), "host": socket.gethostname()}
+
+
+def _windowed(
+    client: Client, requests: Iterator[Request], limits: Limits, function: str, suspects: list[Request]
+) -> Iterator[Summary]:
+    """The summaries; requests whose workers died are put to the `suspects`."""
+    from distributed import KilledWorker, as_completed
+
+    pending: dict[str, Request] = {}
+    done = as_completed([])
+    count, counted = _window(client), time.monotonic()
+    futures = _submit(client, requests, count, limits, function, pending)
+    done.update(futures)
+    del futures
+    for future in done:
+        request = pending.pop(future.key)
+        if future.status in ("cancelled", "lost") or client.status != "running":
+            raise _lost(client)
+        error = future.exception() if future.status == "error" else None
+        if isinstance(error, KilledWorker):
+            suspects.append(request)
+        elif error is not None:
+            raise error
+        else:
+            yield future.result()
+        future.release()
+        if time.monotonic() - counted > _COUNTED:
+            count, counted = _window(client), time.monotonic()
+        done.update(_submit(client, requests, count - len(pending), limits, function, pending))
+
+
+def _submit(
+    client: Client,
+    requests: Iterator[Request],
+    count: int,
+    limits: Limits,
+    function: str,
+    pending: dict[str, Request],
+) -> list[Future[Summary]]:
+    """Futures of up to `count` more requests."""
+    futures = []
+    for request in islice(requests, max(count, 0)):
+        key = f"audit-{uuid.uuid4().hex}"
+        pending[key] = request
+        futures.append(client.submit(perform, request, limits, function, key=key, pure=False))
+    return futures
+
+
+def _window(client: Client) -> int:
+    """How many tasks are in flight."""
+    return _AHEAD * max(int(sum(client.nthreads().values())), 1)
+
+
+@contextmanager
+def _client(scheduler: str, workers: int | None, limits: Limits) -> Iterator[Client]:
+    import dask
+    from distributed import Client, LocalCluster
+
+    with ExitStack() as stack:
+        if scheduler == LOCAL:
+            stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": limits.retries}))
+            cluster = stack.enter_context(
+                LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    memory_limit=0,  # audits are in processes of their own: see guard.py
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+            yield stack.enter_context(Client(cluster))
+        else:
+            yield stack.enter_context(_connected(scheduler, Client))
+
+
+def _connected(scheduler: str, connect: Any) -> Client:
+    named: dict[str, Any] = {"address": scheduler}
+    if "://" not in scheduler:
+        if not Path(scheduler).is_file():
+            expected = "local, an address such as tcp://10.0.0.5:8786, or a scheduler file that is there"
+            raise ConfigurationError("no such scheduler", place="--scheduler", found=scheduler, expected=expected)
+        named = {"scheduler_file": scheduler}
+    try:
+        client: Client = connect(**named, timeout=_PATIENCE)
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(f"no scheduler answers: {error}", place="--scheduler", found=scheduler) from error
+    return client
+
+
+def _lost(client: Client) -> SchedulerLost:
+    return SchedulerLost(
+        "the scheduler went away",
+        file=getattr(client, "_start_arg", None) and str(client._start_arg),
+        advice="what was finished is in the lake: run the command again with --resume",
+    )

@@ -1,0 +1,108 @@
+"""A table that says which recordings a campaign has, with which rig, and what is known of each test."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Mapping
+from datetime import date, datetime
+from pathlib import PurePosixPath
+from typing import Any, Final
+
+from nineaudit.campaign.places import name_of, read_bytes
+from nineaudit.errors import ConfigurationError
+
+TABLES: Final = (".csv", ".tsv", ".parquet", ".jsonl", ".ndjson")
+COLUMN: Final = "recording"
+_HEAD: Final = 65536
+
+Row = dict[str, str]
+
+
+def is_table(uri: str) -> bool:
+    """Whether a file is a table of recordings, and no recording: it has a column `recording` (or `rig`)."""
+    suffix = _suffix(uri)
+    if suffix not in TABLES:
+        return False
+    if suffix in (".jsonl", ".ndjson"):
+        return True
+    return bool({COLUMN, "rig"} & set(_columns(uri, suffix)))
+
+
+def rows(uri: str) -> Iterator[tuple[str, Row]]:
+    """(place, row) of a table; no empty cells. ConfigurationError: no column `recording`, a row without one."""
+    suffix = _suffix(uri)
+    if suffix not in (".jsonl", ".ndjson") and COLUMN not in _columns(uri, suffix):
+        found = ", ".join(_columns(uri, suffix))
+        raise ConfigurationError("has no column of recordings", file=uri, found=found, expected=f"a column {COLUMN}")
+    for i, row in enumerate(_rows(uri, suffix), 1):
+        filled = {str(name).strip(): _text(value) for name, value in row.items() if _text(value)}
+        if COLUMN not in filled:
+            raise ConfigurationError("a row without a recording", file=uri, place=f"row {i}", expected=COLUMN)
+        yield f"{name_of(uri)} row {i}", filled
+
+
+def _columns(uri: str, suffix: str) -> list[str]:
+    if suffix == ".parquet":
+        return list(_parquet(uri).schema.names)
+    lines = read_bytes(uri, "cannot be read")[:_HEAD].decode("utf-8-sig", "replace").splitlines()
+    return [name.strip() for name in next(csv.reader(lines[:1], delimiter=_separator(lines[:1], suffix)), [])]
+
+
+def _rows(uri: str, suffix: str) -> Iterator[Mapping[str, Any]]:
+    if suffix == ".parquet":
+        for batch in _parquet(uri).iter_batches():
+            yield from batch.to_pylist()
+        return
+    try:
+        text = read_bytes(uri, "cannot be read").decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigurationError("is not UTF-8", file=uri, place=f"byte {error.start}") from error
+    if suffix in (".jsonl", ".ndjson"):
+        yield from _json_lines(uri, text)
+        return
+    yield from csv.DictReader(io.StringIO(text), delimiter=_separator(text.splitlines()[:1], suffix), restval="")
+
+
+def _json_lines(uri: str, text: str) -> Iterator[Mapping[str, Any]]:
+    for i, line in enumerate(text.splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            row = json.loads(line)
+        except ValueError as error:
+            raise ConfigurationError(f"is no JSON: {error}", file=uri, place=f"line {i}") from error
+        if not isinstance(row, dict):
+            raise ConfigurationError("is no object", file=uri, place=f"line {i}", expected='{"recording": ...}')
+        yield row
+
+
+def _parquet(uri: str) -> Any:
+    import pyarrow.parquet as pq
+    from pyarrow.lib import ArrowInvalid
+
+    try:
+        return pq.ParquetFile(io.BytesIO(read_bytes(uri, "cannot be read")))
+    except ArrowInvalid as error:
+        raise ConfigurationError(f"is no Parquet table: {error}", file=uri) from error
+
+
+def _separator(head: list[str], suffix: str) -> str:
+    """Of a CSV table: a semicolon where the header has more of them than commas."""
+    if suffix == ".tsv":
+        return "\t"
+    return ";" if head and head[0].count(";") > head[0].count(",") else ","
+
+
+def _text(value: object) -> str:
+    """A cell as text; dates as YYYY-MM-DD."""
+    if value is None or (isinstance(value, float) and value != value):
+        return ""
+    if isinstance(value, datetime) and not any((value.hour, value.minute, value.second, value.microsecond)):
+        return value.date().isoformat()
+    return value.isoformat() if isinstance(value, date) else str(value).strip()
+
+
+def _suffix(uri: str) -> str:
+    return PurePosixPath(name_of(uri)).suffix.lower()
