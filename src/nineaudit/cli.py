@@ -258,12 +258,8 @@ app.command("motion", epilog=motion_command.EXAMPLE)(_printing(motion_command.mo
 app.command("compare", epilog=compare_command.EXAMPLE)(_printing(compare_command.compare))
 app.command("verify", epilog=verify_command.EXAMPLE)(_printing(verify_command.verify))
 
-for name, reference in (
-    ("rules", rules_app),
-    ("rig", rig_app),
-    ("calibrate", calibrate_app),
-    ("campaign", campaign_app),
-):
+APPS = {"rules": rules_app, "rig": rig_app, "calibrate": calibrate_app, "campaign": campaign_app}
+for name, reference in APPS.items():
     app.add_typer(reference, name=name, result_callback=_ended)
 
 
