@@ -49,6 +49,25 @@ def test_any_signal_is_what_cantools_decodes(layout: tuple[Signal, int], seed: i
     np.testing.assert_array_equal(decode(signal, rows), expected)
 
 
+@pytest.mark.parametrize("order", ["little_endian", "big_endian"])
+@pytest.mark.parametrize(("length", "kind"), [(8, "iu"), (16, "iuf"), (32, "iuf"), (64, "f")])
+@pytest.mark.parametrize("scale", [1, 0.1])
+def test_numbers_of_whole_bytes_are_what_cantools_decodes(order: str, length: int, kind: str, scale: float) -> None:
+    """Taken as they stand, wherever they stand; also in payloads shorter than themselves, and of no rows."""
+    for one in kind:
+        conversion = BaseConversion.factory(scale=scale, offset=0, is_float=one == "f")
+        for first in (0, 3):
+            start = 8 * first + (7 if order == "big_endian" else 0)
+            signal = Signal("s", start, length, order, one == "i", conversion=conversion)
+            rows = payloads(length, size := first + length // 8)
+            message, cut = Message(1, "m", size, [signal]), rows.copy()
+            cut[:, -1] = 0
+            expected = np.array([message.decode(row.tobytes())["s"] for row in rows], dtype=np.float64)
+            np.testing.assert_array_equal(decode(signal, rows), expected)
+            np.testing.assert_array_equal(decode(signal, rows[:, :-1]), decode(signal, cut))
+            assert decode(signal, rows[:0]).shape == (0,)
+
+
 @settings(derandomize=True, max_examples=100, deadline=None)
 @given(layouts(longest=64), st.integers(0, 10**6))
 def test_raw_values_are_exact_up_to_64_bits(layout: tuple[Signal, int], seed: int) -> None:

@@ -38,13 +38,13 @@ def decode(signal: Any, payload: ByteMatrix) -> FloatArray:
     """(n,) physical values, in the database's unit, of a signal in (n, bytes) payloads: raw·scale + offset, bit by bit
     what cantools computes up to 53 bits. Bytes beyond a payload's end are zeros."""
     out = np.empty(len(payload))
-    for start, raw in _blocks(signal, payload):
+    for start, raw in _columns(signal, payload) if _whole(signal) else _blocks(signal, payload):
         there = out[start : start + len(raw)]
         if _exact(signal):
             there[:] = raw.astype(np.int64) * int(signal.scale) + int(signal.offset)
         else:
             with np.errstate(invalid="ignore", over="ignore"):  # any bits are a floating-point number, NaN too
-                np.multiply(raw, float(signal.scale), out=there)
+                np.multiply(raw, np.float64(signal.scale), out=there)
                 there += float(signal.offset)
     return out
 
@@ -125,6 +125,26 @@ def _exact(signal: Any) -> bool:
         return False
     reach = max(signal.length + int(abs(signal.scale)).bit_length(), int(abs(signal.offset)).bit_length())
     return bool(reach < _EXACT)
+
+
+def _whole(signal: Any) -> bool:
+    """Whether a signal is a number of whole bytes, as a processor has it."""
+    start = signal.start if signal.byte_order == "little_endian" else _highest(signal)
+    return start % 8 == 0 and signal.length in (8, 16, 32, 64)
+
+
+def _columns(signal: Any, payload: ByteMatrix) -> Any:
+    """As _blocks, of a signal of whole bytes: its column of the payloads as it stands, integers of its own size."""
+    first, last = _span(signal)
+    payload = _wide(payload, last + 1)
+    kind = "f" if signal.is_float else "i" if signal.is_signed else "u"
+    order = "<" if signal.byte_order == "little_endian" else ">"
+    dtype, (rows, width) = np.dtype(f"{order}{kind}{last + 1 - first}"), payload.shape
+    for start in range(0, rows, _BLOCK):
+        block = payload[start : start + _BLOCK]
+        raw: NDArray[Any] = np.ndarray((len(block),), dtype=dtype, buffer=block, offset=first, strides=(width,))
+        with np.errstate(invalid="ignore"):  # a signalling NaN
+            yield start, raw.astype(np.float64) if signal.is_float else raw
 
 
 def _blocks(signal: Any, payload: ByteMatrix) -> Any:

@@ -22,6 +22,7 @@ Sizes = NDArray[np.int64]
 
 _TENS, _NANOSECONDS = 1, 2
 _TEN_MICROSECONDS: Final = 10_000
+_MOST: Final = int(np.iinfo(np.int64).max)
 _MARKER: Final = 96
 _FARTHEST: Final = 4e9
 """s that an origin can be from the stamps: they stay within int64 ns."""
@@ -131,7 +132,7 @@ def _book(account: Account, batch: Batch, what: str, fault: NDArray[np.bool_], l
 
 def _late(heads: Records, start: int) -> Any:
     """(m,) true where a time does not fit into int64 ns; (1,) false if there is none."""
-    most = np.iinfo(np.int64).max - max(start, 0)
+    most = _MOST - max(start, 0)
     if int(heads["time"].max(initial=0)) <= most // _TEN_MICROSECONDS:
         return np.zeros(1, dtype=np.bool_)
     limit = np.where(heads["unit"] == _TENS, most // _TEN_MICROSECONDS, most)
