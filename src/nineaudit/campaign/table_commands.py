@@ -105,3 +105,30 @@ def diff(
     if format == DiffFormat.json:
         return [json.dumps(comparing.document(found), indent=2, ensure_ascii=False)], found.exit_code
     return comparing.lines(found), found.exit_code
+
+
+@campaign_app.command("report", epilog=example("nineaudit campaign report lake --html index.html --junit junit.xml"))
+def report(
+    lake: LakeOption,
+    html: Annotated[
+        Path | None, typer.Option(metavar="F", help="Write the index: one page, a row a recording.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="F", help="Write JUnit XML, a testcase a recording.")] = None,
+) -> Ended:
+    """Write the index page of a lake, and JUnit XML, from its tables (see `campaign compact`)."""
+    from nineaudit.campaign import reporting
+    from nineaudit.campaign.compact import stored
+    from nineaudit.campaign.lake import open_lake
+    from nineaudit.errors import ConfigurationError
+    from nineaudit.outputs import protect
+
+    if html is None and junit is None:
+        raise ConfigurationError("nothing to write", expected="--html F, --junit F, or both")
+    protect([html, junit], [])
+    opened = open_lake(lake)
+    tables = stored(opened)
+    if html is not None:
+        reporting.write_index(opened, tables, html)
+    if junit is not None:
+        reporting.write_junit_file(opened, tables, junit)
+    return [str(path) for path in (html, junit) if path is not None], 0

@@ -10,6 +10,7 @@ import hashlib
 import math
 import os
 import tempfile
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -115,12 +116,16 @@ def style(more: str = "") -> dict[str, Any]:
     return {"css": Markup(sheet), "csp": _policy(f"style-src {_digest(sheet)}")}
 
 
-def script() -> dict[str, Any]:
-    """The style sheet and the script of a page that can zoom and be reviewed, and the policy that allows just these."""
+ZOOM_STYLE = "vendor/uplot/uPlot.min.css"
+
+
+def script(names: Sequence[str] = SCRIPTS, sheet: str = ZOOM_STYLE) -> dict[str, Any]:
+    """The style sheet with `sheet`, the scripts of a page (of one that can zoom and be reviewed), and the policy that
+    allows just these."""
     from markupsafe import Markup
 
-    code = "\n" + "\n".join(_packaged(name) for name in SCRIPTS)
-    styled = style("\n" + _packaged("vendor/uplot/uPlot.min.css") + "\n")
+    code = "\n" + "\n".join(_packaged(name) for name in names)
+    styled = style("\n" + _packaged(sheet) + "\n")
     policy = _policy(f"script-src {_digest(code)}; style-src {_digest(styled['css'])}")
     return styled | {"script": Markup(code), "csp": policy}
 
