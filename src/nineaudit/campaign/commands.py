@@ -18,4 +18,4 @@ def _campaign() -> None:
     pass
 
 
-from nineaudit.campaign import run_command, table_commands  # noqa: E402, F401  (registers on it)
+from nineaudit.campaign import health_command, run_command, table_commands  # noqa: E402, F401  (registers on it)

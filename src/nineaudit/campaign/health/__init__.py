@@ -1,0 +1,12 @@
+"""Which sensor is going bad? What the recordings of a campaign say together of each sensor, by its serial number.
+
+records.py    entries of the lake -> likelihoods in order of time
+model.py      the hierarchical model: sensors, seats, tests        scatter.py   how much tests differ
+scan.py       changes with time and shock history                   select.py    which of them there are
+assess.py     verdicts        words.py    text and JSON             page.py      charts
+rig_file.py   the improved calibration as a rig file
+"""
+
+from nineaudit.campaign.health.assess import Health, Member, State, assess
+
+__all__ = ["Health", "Member", "State", "assess"]

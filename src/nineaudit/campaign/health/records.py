@@ -1,0 +1,203 @@
+"""From entries of the lake to what each recording says of its sensors, in the order of time.
+
+Rig files may restate a sensor (a new scale after a calibration, a position measured again). What is compared is the
+sensor itself: every likelihood is moved to what the rig said of it first,
+
+    θ_first = Q θ + c,    η → Q η + Q Λ Qᵀ c,    Λ → Q Λ Qᵀ
+
+with c the restatement (ln of the scales' ratio, difference of positions, of axes), Q a turn of the tilts' directions.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from typing import Any, Final
+
+import numpy as np
+
+from nineaudit.array import FloatArray
+from nineaudit.estimate.calibration import perpendicular
+from nineaudit.report.sensors import unpacked
+
+UNIT: Final = {"gain": 0.005, "tilt": 0.01, "position": 5e-4}
+"""What errors are counted in here: relative, rad, m."""
+SAME_SCALE, SAME_PLACE = 0.2, 5e-3
+"""Restated by more (relative, m), it is another setting of the sensor, another seat."""
+
+Seat = tuple[str, str]
+"""Name of the rig, and channel."""
+
+
+def family(parameter: str) -> str:
+    """gain, tilt or position."""
+    return parameter.partition("_")[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One error of one channel: its `sensor` (serial number, or rig and channel where it has none), `seat`, `kind`,
+    `parameter`, the rig's standard uncertainty `prior` in UNIT, and the axis as a name, of tilts."""
+
+    sensor: str
+    seat: Seat
+    kind: str
+    parameter: str
+    prior: float
+    axis: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One recording: `rows` of `eta` (p,) and `matrix` (p,p), in UNIT; `when` in days or places of the order; `label`
+    of it; `shock` by sensor, m/s²."""
+
+    uri: str
+    label: str
+    when: float
+    rows: tuple[Row, ...]
+    eta: FloatArray
+    matrix: FloatArray
+    shock: Mapping[str, float]
+
+
+@dataclass(eq=False)
+class Records:
+    """All that tell something, in order; `dated`, whether that is the order of dates; `notes` on what is left out."""
+
+    records: list[Record]
+    dated: bool
+    notes: list[str]
+    named: frozenset[str]
+    """Sensors that have a serial number."""
+
+
+@dataclass(eq=False)
+class _First:
+    """What rigs said first of each sensor and seat."""
+
+    scale: dict[str, float] = field(default_factory=dict)
+    place: dict[Seat, FloatArray] = field(default_factory=dict)
+    axis: dict[Seat, FloatArray] = field(default_factory=dict)
+    restated: set[str] = field(default_factory=set)
+
+
+def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
+    """The recordings of `entries` that tell a calibration, in order of date, else of test number, else of uri."""
+    kept, why = [], Counter[str]()
+    for entry in entries:
+        block = (entry["result"].get("sensors") or {}) if entry.get("result") else {}
+        if block.get("information"):
+            known = {**(entry["result"].get("test") or {}), **(entry.get("test") or {})}
+            kept.append((known, entry["uri"], entry["result"]["rig"]["name"], block))
+        else:
+            why[block.get("fit") or "audited by a version that did not say it, or not audited"] += 1
+    notes = [f"{count} recordings tell no calibration: {reason}" for reason, count in sorted(why.items())]
+    days = [_day(known.get("date")) for known, *_ in kept]
+    dated = 2 * sum(d is not None for d in days) > len(days)
+    if dated and None in days:
+        notes.append(f"{days.count(None)} recordings without a date are left out")
+    if not dated and kept:
+        notes.append("most recordings have no date: they are in the order of their test numbers, else of their names")
+    order = sorted(
+        (i for i, d in enumerate(days) if d is not None or not dated),
+        key=lambda i: (days[i] if dated else 0, _natural(str(kept[i][0].get("number") or "")), _natural(kept[i][1])),
+    )
+    first, named, records = _First(), set[str](), []
+    for place, i in enumerate(order):
+        known, uri, rig, block = kept[i]
+        day = days[i]
+        when = float(day) if dated and day is not None else float(place)
+        label = str(known["date"])[:10] if dated else str(known.get("number") or uri)
+        records.append(_record(uri, label, when, rig, block, first))
+        named |= {c["serial"] for c in block["channels"] if c["serial"]}
+    if first.restated:
+        notes.append(f"stated in other units or settings, compared as stated: {', '.join(sorted(first.restated))}")
+    return Records(records, dated, notes, frozenset(named))
+
+
+def _record(uri: str, label: str, when: float, rig: str, block: Mapping[str, Any], first: _First) -> Record:
+    channels = {c["channel"]: c for c in block["channels"]}
+    told = block["information"]
+    prior = np.array(told["prior"], dtype=np.float64)
+    names = [(str(c), str(p)) for c, p in told["parameters"]]
+    seats = {c: _seat(rig, channels[c], first) for c in {name for name, _ in names}}
+    rows = tuple(_row(rig, channels[c], p, u, seats[c]) for (c, p), u in zip(names, prior, strict=True))
+    eta, matrix = unpacked(told)
+    scale = np.array([UNIT[family(row.parameter)] for row in rows]) / prior
+    eta, matrix = scale * eta, scale[:, None] * matrix * scale
+    turn, moved = _restated(rows, channels, names, first)
+    matrix = turn @ matrix @ turn.T
+    shock = {_sensor(rig, c): float(c["shock"] or 0.0) for c in channels.values()}
+    return Record(uri, label, when, rows, turn @ eta + matrix @ moved, matrix, shock)
+
+
+def _sensor(rig: str, channel: Mapping[str, Any]) -> str:
+    return str(channel["serial"] or f"{rig}/{channel['channel']}")
+
+
+def _row(rig: str, channel: Mapping[str, Any], parameter: str, prior: float, seat: Seat) -> Row:
+    axis = tuple(_rounded(channel["axis"]).tolist()) if family(parameter) == "tilt" else ()
+    size = float(prior) / UNIT[family(parameter)]
+    return Row(_sensor(rig, channel), seat, channel["kind"], parameter, size, axis)
+
+
+def _seat(rig: str, channel: Mapping[str, Any], first: _First) -> Seat:
+    """The seat of a channel: another one where the rig has it at another place than before."""
+    place, name = np.array(channel["position"], dtype=np.float64), str(channel["channel"])
+    for again in range(1, 1000):
+        seat = (rig, name if again == 1 else f"{name} (place {again})")
+        if float(np.abs(first.place.setdefault(seat, place) - place).max()) <= SAME_PLACE:
+            return seat
+    return rig, name
+
+
+def _rounded(axis: Iterable[float]) -> FloatArray:
+    """A direction to a degree or so, by which tilts of restated axes are compared."""
+    rough = np.round(np.array(list(axis), dtype=np.float64), 1) + 0.0
+    return np.asarray(rough / np.linalg.norm(rough))
+
+
+def _restated(
+    rows: tuple[Row, ...], channels: Mapping[str, Any], names: list[tuple[str, str]], first: _First
+) -> tuple[FloatArray, FloatArray]:
+    """(p,p) Q and (p,) c of the module's equation."""
+    turn, moved = np.eye(len(rows)), np.zeros(len(rows))
+    place = {name: i for i, name in enumerate(names)}
+    for i, (row, (channel, parameter)) in enumerate(zip(rows, names, strict=True)):
+        said = channels[channel]
+        if parameter == "gain":
+            moved[i] = _rescaled(row.sensor, float(said["scale"]), first) / UNIT["gain"]
+        elif family(parameter) == "position":
+            at = "xyz".index(parameter[-1])
+            moved[i] = (said["position"][at] - first.place[row.seat][at]) / UNIT["position"]
+        elif parameter == "tilt_1" and (channel, "tilt_2") in place:
+            pair = [i, place[channel, "tilt_2"]]
+            axis = np.array(said["axis"], dtype=np.float64)
+            common = perpendicular(np.array(row.axis))
+            turn[np.ix_(pair, pair)] = common @ perpendicular(axis).T
+            moved[pair] = common @ (axis - first.axis.setdefault(row.seat, axis)) / UNIT["tilt"]
+    return turn, moved
+
+
+def _rescaled(sensor: str, scale: float, first: _First) -> float:
+    ratio = float(np.log(scale / first.scale.setdefault(sensor, scale)))
+    if abs(ratio) <= SAME_SCALE:
+        return ratio
+    first.restated.add(sensor)
+    return 0.0
+
+
+def _day(text: object) -> int | None:
+    try:
+        return date.fromisoformat(str(text)[:10]).toordinal()
+    except ValueError:
+        return None
+
+
+def _natural(text: str) -> tuple[tuple[int, int, str], ...]:
+    """T9 before T10."""
+    return tuple((0, int(p), "") if p.isdecimal() else (1, 0, p) for p in re.split(r"(\d+)", text) if p)
