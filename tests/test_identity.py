@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from xml.etree import ElementTree as ET
 
 import pytest
 
+from nineaudit.auditing import Audit, audit
 from nineaudit.errors import ConfigurationError
 from nineaudit.identity import KEYS, Identity, Stated, from_options, identify, is_date, moment, stated
 from nineaudit.readers import read
 from nineaudit.readers.can.asc import read_asc
-from nineaudit.report import result_document, result_schema
+from nineaudit.report import junit, markdown, result_document, result_schema, to_json
+from nineaudit.report.page import render
+from nineaudit.report.result_page import render_result
 from nineaudit.rig import load_rig, parse_rig
 from nineaudit.simulate import simulate
 from nineaudit.writers import write_recording
@@ -183,8 +190,6 @@ def test_a_header_with_another_kind_of_date_gives_no_date_and_a_remark(mme: Path
 def test_the_result_says_which_test_it_is(mme: Path) -> None:
     from jsonschema import Draft202012Validator
 
-    from nineaudit import audit
-
     about = from_options(["number=T2", "item=<script>alert(1)</script>"])
     recording = read(_with_header(mme, HEADER), parse_rig(RIG), test=about)
     document = result_document(audit(recording))
@@ -272,3 +277,70 @@ def test_an_mf4_file_says_when_it_was_started(tmp_path: Path) -> None:
         log.append([asammdf.Signal(t.values, t.time, name=t.signal, unit="m/s^2") for t in made.native])
         log.save(tmp_path / "a.mf4")
     assert read(tmp_path / "a.mf4", parse_rig(RIG)).test.started == "2026-01-31T08:00:00.250+00:00"
+
+
+HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(2)>|`*'
+
+
+@cache
+def _plain() -> Audit:
+    return audit(simulate(parse_rig(RIG + "[recording]\npre_trigger = [-0.02, -0.001]\n"), "general", seed=1).recording)
+
+
+def _of(test: Identity) -> Audit:
+    """The audit of a healthy recording of that test."""
+    return replace(_plain(), recording=replace(_plain().recording, test=test))
+
+
+def _audited(*given: str) -> Audit:
+    return _of(identify(from_options(given)))
+
+
+@pytest.mark.parametrize("key", [key for key in KEYS if key != "date"])
+def test_no_statement_about_a_test_becomes_markup(key: str) -> None:
+    done = _audited(f"{key}={HOSTILE}")
+    for page in (render(done), render_result_of(done)):
+        assert "<script>alert" not in page
+        assert "<img src=x" not in page
+        assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+    assert "<script" not in markdown([done])
+    ET.fromstring(junit([done]))
+
+
+def render_result_of(done: Audit) -> str:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "result.json"
+        path.write_text(to_json(result_document(done)))
+        return render_result(path)
+
+
+def test_the_report_shows_what_is_known_and_where_it_was_stated() -> None:
+    done = _audited("number=T7", "item=head form", "item_serial=4711")
+    for page in (render(done), render_result_of(done)):
+        assert re.search(r"<dt>Test number</dt><dd>T7 <span class=\"source\">option --test</span>", page)
+        assert "T7, head form ·" in page
+    page = render(done)
+    assert "Not stated: Date of the test, laboratory." in page
+    assert '<input type="text" name="test" value="T7">' in page
+    assert '<input type="text" name="item" value="head form, 4711">' in page
+    assert '<input type="text" name="tested_on">' in page
+
+
+def test_contradictions_stand_in_the_report() -> None:
+    parts = [Stated("number", "T1", "header a.mme"), Stated("number", "T2", "header b.mme")]
+    done = _of(identify(parts))
+    said = "they contradict each other, and none is taken"
+    assert render(done).count(said) == 2  # identification, deviations
+    assert said in render_result_of(done)
+
+
+def test_ci_outputs_name_the_test() -> None:
+    known, unknown = _audited("number=T7", "item=head form"), _audited()
+    suites = ET.fromstring(junit([known, unknown])).findall("testsuite")
+    found = {p.get("name"): p.get("value") for p in suites[0].findall("properties/property")}
+    assert found == {"test.number": "T7", "test.item": "head form"}
+    assert suites[1].find("properties") is None
+    assert suites[0].get("tests") == suites[1].get("tests") == str(len(suites[0].findall("testcase")))
+    assert "| recording | test | verdict | diagnosis |\n|---|---|---|---|" in markdown([known])
+    assert "| T7, head form | **" in markdown([known])
+    assert "| recording | verdict | diagnosis |\n|---|---|---|" in markdown([unknown])

@@ -18,6 +18,7 @@ from jsonschema import Draft202012Validator
 
 import nineaudit
 from nineaudit import report
+from nineaudit.array import frozen
 from nineaudit.diagnose import Diagnosis, Status
 from nineaudit.physics.spectrum import density
 from nineaudit.recording import Damage
@@ -68,7 +69,7 @@ def page() -> Page:
 
 
 def test_verdict_culprit_and_next_best_stand_first(page: Page) -> None:
-    head = page.text[: page.text.index("Identification Recording")]
+    head = page.text[: page.text.index("Identification Not stated: Test number, test item,")]
     assert "Channel a1y is at fault: clipping, probability 0.98." in head
     assert "Next best candidate: a2x" in head
     assert "peak α" in head
@@ -571,3 +572,13 @@ def test_time_axis_counts_from_zero_unless_the_clock_is_far_away() -> None:
     origin, _, label = time_scale(1.7e9 + np.array([0.0, 10.0]))
     assert origin == 1.7e9
     assert "since the first sample" in label
+
+
+def test_a_recording_without_a_quiet_interval_has_a_report() -> None:
+    made = simulate(parse_rig('[rig]\npreset = "naap-3222"\n'), "general", seed=1).recording
+    cut = frozen(made.time[600:])
+    native = tuple(replace(trace, time=cut, values=frozen(trace.values[600:])) for trace in made.native)
+    moving = replace(made, time=cut, readings=frozen(made.readings[600:]), valid=made.valid[600:], native=native)
+    done = nineaudit.audit(moving)
+    assert done.rest is None
+    assert "No quiet interval was found or stated: no zero was taken off." in report.render(done)

@@ -142,7 +142,7 @@ class Audit:
 
     @cached_property
     def _constraints(self) -> tuple[FloatArray, FloatArray] | None:
-        problem = self.case.nap_problem
+        problem = _or(lambda: self.case.nap_problem, lambda _: None)
         if problem is None or self.case.nap_layout is None:
             return None
         columns, arms = self.case.nap_layout

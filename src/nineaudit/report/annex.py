@@ -119,6 +119,7 @@ def deviations(audit: Audit) -> list[tuple[str, str]]:
     told += [("waiver", f) for f in audit.findings if f.rule == WAIVERS and f.verdict in (Verdict.FAIL, Verdict.WARN)]
     told += [("not evaluated", f) for f in audit.findings if f.verdict is Verdict.NOT_EVALUATED]
     rows = [(f"{f.rule} {word}", _said(f)) for word, f in told]
+    rows += [("identification", remark) for remark in recording.test.remarks]
     if not source.unchanged_after_read:
         rows.append(("file", "the recording changed while it was read"))
     if recording.resampled:

@@ -50,6 +50,11 @@ def junit(audits: Sequence[Audit], unread: Unread | None = None, fail_on: str = 
 def _suite(root: ET.Element, audit: Audit, fail_on: str) -> None:
     path = _xml(audit.recording.source.path.as_posix())
     suite = ET.SubElement(root, "testsuite", name=path)
+    known = audit.recording.test.known
+    if known:
+        properties = ET.SubElement(suite, "properties")
+        for key, value in known.items():
+            ET.SubElement(properties, "property", name=f"test.{key}", value=_xml(value))
     for code, findings in by_family(audit.findings).items():
         name = f"{code} {family_title(code)}"
         case = ET.SubElement(suite, "testcase", classname=path, name=_xml(name))
@@ -81,7 +86,7 @@ def _decisive(findings: list[Finding], fail_on: str) -> tuple[str, Finding | Non
 
 
 def _count(suite: ET.Element) -> None:
-    suite.set("tests", str(len(suite)))
+    suite.set("tests", str(len(suite.findall("testcase"))))
     for plural, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(plural, str(len(suite.findall(f"testcase/{tag}"))))
 
@@ -125,15 +130,30 @@ def _escape_property(text: str) -> str:
 
 def markdown(audits: Sequence[Audit], unread: Unread | None = None) -> str:
     """A job summary: a row per recording, then the worst findings; never more than 1 MiB."""
-    rows = [
-        f"| {_cell(a.recording.source.path.name)} | **{a.verdict.replace('_', ' ')}** "
-        f"| {_cell(diagnosis_sentence(a.diagnosis))} |"
+    table = [
+        (a.recording.source.path.name, _test(a), f"**{a.verdict.replace('_', ' ')}**", diagnosis_sentence(a.diagnosis))
         for a in audits
-    ] + [f"| {_cell(p.name)} | **not audited** | {_cell(reason)} |" for p, reason in (unread or {}).items()]
+    ] + [(p.name, "", "**not audited**", reason) for p, reason in (unread or {}).items()]
+    shown = [i for i in range(len(_HEADS)) if i != 1 or any(row[1] for row in table)]
+    rows = [_row([row[i] if i == _BOLD else _cell(row[i]) for i in shown]) for row in table]
     items = [f"- {_cell(a.recording.source.path.name)}: {_cell(finding_line(f))}" for f, a in _worst(audits)[:WORST]]
-    head = ["## nineaudit", "", "| recording | verdict | diagnosis |", "|---|---|---|"]
+    head = ["## nineaudit", "", _row([_HEADS[i] for i in shown]), "|" + "---|" * len(shown)]
     tail = ["", "### Worst findings", "", *items] if items else []
     return _within(head, rows, tail)
+
+
+_HEADS = ("recording", "test", "verdict", "diagnosis")
+_BOLD = _HEADS.index("verdict")
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _test(audit: Audit) -> str:
+    """Number and item of the test, as far as they are known."""
+    test = audit.recording.test
+    return ", ".join(word for word in (test.number, test.item) if word)
 
 
 def _within(head: list[str], rows: list[str], tail: list[str]) -> str:

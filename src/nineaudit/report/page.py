@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.finding import Verdict
-from nineaudit.report import annex, hypotheses, method, origin, review, tables
+from nineaudit.report import annex, hypotheses, method, origin, review, tables, tested
 from nineaudit.report.channels import gallery
 from nineaudit.report.figures import Figure, constraint_figures, motion_figures, reconstruction_figures
 from nineaudit.report.findings import NOTABLE, WEIGHT, by_rule, channels
@@ -177,6 +177,7 @@ def context(audit: Audit) -> dict[str, Any]:
 def _tables(audit: Audit) -> dict[str, Any]:
     return {
         "identity": origin.identity(audit),
+        "test": tested.section(audit.recording.test),
         "candidates": tables.candidates(audit),
         "sensitivity": tables.sensitivity(audit),
         "impact": tables.impact(audit),

@@ -14,6 +14,7 @@ from nineaudit.report.findings import WEIGHT
 from nineaudit.report.machine import SCHEMA
 from nineaudit.report.numbers import DASH, digits, probability, seconds, spelled
 from nineaudit.report.page import LEAD, MARKS, headline, style, template
+from nineaudit.report.tested import shown
 from nineaudit.report.text import fault_word, joined
 
 
@@ -58,6 +59,20 @@ class ImpactModel(BaseModel):
     unit: str = ""
 
 
+class TestModel(BaseModel):
+    """Which test it was; keys of identity.KEYS, and "started"."""
+
+    model_config = ConfigDict(extra="allow")
+
+    sources: dict[str, str] = {}
+    remarks: list[str] = []
+
+    @property
+    def known(self) -> dict[str, str]:
+        """What is stated, but for what this version has no name for."""
+        return {key: str(value) for key, value in (self.model_extra or {}).items() if isinstance(value, str)}
+
+
 class ResultModel(BaseModel):
     """What the page shows of ``nineaudit/result/1``; what it does not know it leaves alone."""
 
@@ -71,6 +86,7 @@ class ResultModel(BaseModel):
     findings: list[FindingModel]
     diagnosis: DiagnosisModel | None = None
     impact: dict[str, ImpactModel] = {}
+    test: TestModel = TestModel()
 
 
 def load_result(path: Path) -> ResultModel:
@@ -100,6 +116,7 @@ def _context(result: ResultModel) -> dict[str, Any]:
         "marks": {str(verdict): mark for verdict, mark in MARKS.items()},
         "name": Path(str(result.recording.get("path", "recording"))).name,
         "rig": result.rig.get("name", ""),
+        "test": shown(result.test.known, result.test.sources, result.test.remarks),
         "verdict": result.verdict,
         "label": result.verdict.replace("_", " "),
         "sentence": result.reason or _sentence(result.diagnosis),

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.report.origin import number
+from nineaudit.report.tested import filled_in
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -30,7 +31,7 @@ SIGNATURES = ("Test engineer", "Reviewer")
 
 def form(audit: Audit) -> dict[str, Any]:
     """Fields, decisions and signature lines, and as JSON what the review is about."""
-    source = audit.recording.source
+    source, known = audit.recording.source, filled_in(audit.recording.test)
     about = {
         "report": number(audit),
         "recording": source.path.name,
@@ -40,7 +41,7 @@ def form(audit: Audit) -> dict[str, Any]:
     }
     return {
         "about": json.dumps(about, ensure_ascii=False, separators=(",", ":")),
-        "fields": FIELDS,
+        "fields": [(name, title, known.get(name, "")) for name, title in FIELDS],
         "decisions": DECISIONS,
         "signatures": SIGNATURES,
     }
