@@ -16,6 +16,7 @@ gaps = [[0.03, 0.035]]        # samples lost in all channels
 jitter = 2e-5                 # standard deviation of the stamps
 repeat = 3                    # so many stamps are those of the sample before
 quantise = {a1y = 5.0}        # step, SI
+stamps = {a2x = {drift = 5e-4, late = 3e-4, jump = 1e-4}}  # its clock runs fast, is late, jumps in the middle
 [case.counts]                 # what the container held (CAN frames)
 frames = 1000
 [[case.damage]]               # what of the file could not be read (recording.Damage)
@@ -39,6 +40,7 @@ from typing import Any
 import numpy as np
 
 from bus_logs import bus_from
+from nineaudit.array import FloatArray
 from nineaudit.case import Case
 from nineaudit.engine import run
 from nineaudit.finding import Finding
@@ -111,5 +113,13 @@ def _disturbed(recording: Recording, how: Mapping[str, Any], seed: int) -> Recor
         step = steps.get(trace.channel)
         values = trace.values if step is None else step * np.round(trace.values / step)
         unit = "m/s^2" if sensor.kind == "accelerometer" else "rad/s"
-        traces.append(replace(trace, time=time[kept], values=values[kept], unit=unit))
+        own = _stamps(time[kept], how.get("stamps", {}).get(trace.channel, {}))
+        traces.append(replace(trace, time=own, values=values[kept], unit=unit))
     return assemble(Contents(tuple(traces)), recording.rig, recording.source)
+
+
+def _stamps(time: FloatArray, clock: Mapping[str, float]) -> FloatArray:
+    """What a clock of its own makes of the stamps: `drift` counts from the first."""
+    assert set(clock) <= {"drift", "late", "jump"}
+    jump = np.where(time > time.mean(), clock.get("jump", 0.0), 0.0)
+    return np.asarray(time[0] + (time - time[0]) / (1.0 + clock.get("drift", 0.0)) + clock.get("late", 0.0) + jump)

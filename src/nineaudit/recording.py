@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import hypot, sqrt
+from math import hypot, nan, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +56,9 @@ class Alignment:
     much faster than that it runs, as the stamps tell, and its standard uncertainty `u_drift`. `skew` s: how long after
     the base's nearest its samples are stamped, NaN where that changes along the record. `u_timing` s: standard
     uncertainty of its time against the base that came with the alignment (it is in the rig's u_timing already);
-    `u_value` SI: rms error of the interpolation.
+    `u_value` SI: rms error of the interpolation. `slip` s: by how much the skew departs from the straight line that a
+    steady drift makes of it, from one part of the record to another, and its standard uncertainty `u_slip`; NaN where
+    its rate is no whole part of the base's, or the record is too short to tell.
     """
 
     channel: str
@@ -67,6 +69,8 @@ class Alignment:
     skew: float
     u_timing: float
     u_value: float
+    slip: float = nan
+    u_slip: float = nan
 
     def deviation(self, noise: float) -> float:
         """What counts as the deviation of each reading on the common time base, `noise` that of one as it was taken.

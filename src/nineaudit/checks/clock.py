@@ -1,4 +1,4 @@
-"""RQ101-105: is the record complete, and were its samples taken when the time stamps say?
+"""RQ101-105, RQ108: is the record complete, and were its samples taken when the time stamps say?
 
 Time stamps are as recorded: `Clock` of each native trace. Channels with one clock are one subject.
 """
@@ -9,9 +9,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from nineaudit.array import Sensor
 from nineaudit.case import Case
 from nineaudit.finding import Measure, NotApplicable
-from nineaudit.recording import Clock
+from nineaudit.recording import Alignment, Clock
 from nineaudit.units import counted
 
 
@@ -95,6 +96,49 @@ def sampling_rate(case: Case, *, min_ratio: float, tolerance: float) -> Sequence
     ]
 
 
+def common_time(case: Case, *, coverage: float) -> Sequence[Measure] | NotApplicable:
+    """RQ108: how far each clock runs away from the base's along the record, and how far their skew moves beside that,
+    against `coverage` times what the rig and the alignment say of their timing."""
+    if not case.recording.alignments:
+        return NotApplicable("all channels have the same time stamps")
+    alike: dict[tuple[float, ...], list[Alignment]] = {}
+    for a in case.recording.alignments:
+        covered = coverage * float(np.hypot(case.array[a.channel].u_timing, _base(case).u_timing))
+        alike.setdefault((covered, a.drift, a.rate, *np.nan_to_num([a.skew, a.slip])), []).append(a)
+    return [measure for (covered, *_), found in alike.items() for measure in _against_base(case, found, covered)]
+
+
+def _base(case: Case) -> Sensor:
+    """The first channel whose time stamps are those of the common time base."""
+    return next(s for s in case.array.sensors if s.channel not in case.recording.resampled)
+
+
+def _against_base(case: Case, alike: Sequence[Alignment], covered: float) -> Iterator[Measure]:
+    one, base = alike[0], _base(case).channel
+    channels = tuple(a.channel for a in alike)
+    span = float(case.time[-1] - case.time[0])
+    ratio = f"{one.ratio[0]}:{one.ratio[1]}"
+    off = f"{1e6 * one.drift:+.3g} ± {1e6 * one.u_drift:.2g} ppm off {ratio} against {base}"
+    yield Measure(
+        value=abs(one.drift) * span,
+        limit=covered,
+        unit="s",
+        u=one.u_drift * span,
+        channels=channels,
+        detail=f"rate {off}: along {span:.3g} s their time runs apart by",
+    )
+    if np.isfinite(one.slip):
+        apart = f"stamped {1e3 * one.skew:.4g} ms after {base}" if np.isfinite(one.skew) else f"skew to {base} slides"
+        yield Measure(
+            value=one.slip,
+            limit=covered,
+            unit="s",
+            u=one.u_slip,
+            channels=channels,
+            detail=f"{apart}, and besides a steady drift that changes by",
+        )
+
+
 def _clocks(case: Case) -> Iterator[tuple[Clock, tuple[str, ...]]]:
     """Each distinct clock with its channels; no names where one clock serves the whole recording."""
     shared: dict[Clock, list[str]] = {}
@@ -119,4 +163,11 @@ def _invalid_interval(case: Case, column: int) -> tuple[float, float] | None:
     return None if not bad.size else (float(case.time[bad[0]]), float(case.time[bad[-1]]))
 
 
-CHECKS = {"RQ101": completeness, "RQ102": gaps, "RQ103": jitter, "RQ104": disorder, "RQ105": sampling_rate}
+CHECKS = {
+    "RQ101": completeness,
+    "RQ102": gaps,
+    "RQ103": jitter,
+    "RQ104": disorder,
+    "RQ105": sampling_rate,
+    "RQ108": common_time,
+}

@@ -20,6 +20,10 @@ from nineaudit.estimate.normal import eliminate, normal_equations
 from nineaudit.estimate.point import Point, point
 
 ITERATIONS, SMALLEST_STEP, ROUNDING = 25, 1e-3, 1e-10
+NOTHING, IDLE = 1.0, 3
+"""Of twice the negative log posterior, and steps: the normal equations leave out that the slope on which a time skew
+acts moves with ω. Where skews are large they promise, step after step, a little that is not there; a promise below
+NOTHING that IDLE steps did not keep, or none can, is not waited for."""
 
 
 class Tolerance(NamedTuple):
@@ -89,25 +93,37 @@ def fit(
     A fit that has not settled within `iterations`, or after three neither costs nor is promised less than `hopeless`,
     says so: `converged`. EstimationError where ω is not determined.
     """
-    here = point(data, start, np.zeros(len(data.channel)) if theta is None else theta)
+    here, idle = point(data, start, np.zeros(len(data.channel)) if theta is None else theta), 0
     for iteration in range(1, iterations + 1):
         solved = eliminate(normal_equations(here))
         step_theta = np.asarray(np.linalg.solve(solved.schur, solved.pull), dtype=np.float64)
-        step_omega = solved.step(step_theta)
-        scale, previous, promised = 1.0, here.cost, solved.fall + float(solved.pull @ step_theta)
-        while True:
-            trial = point(data, here.omega + scale * step_omega, here.theta + scale * step_theta, here.columns)
-            if trial.cost <= previous * (1.0 + ROUNDING) or scale < SMALLEST_STEP:
-                break
-            scale *= 0.25
-        here, stuck = trial, trial.cost > previous * (1.0 + ROUNDING)
-        size = here.cost + data.dof
+        promised = solved.fall + float(solved.pull @ step_theta)
+        previous, here = _descended(here, solved.step(step_theta), step_theta)
+        stuck, size = here.cost > previous * (1.0 + ROUNDING), here.cost + data.dof
         missed = abs(previous - promised - here.cost)
+        idle = idle + 1 if promised <= NOTHING and abs(previous - here.cost) <= tolerance.gain * size else 0
         converged = promised <= tolerance.gain * size or missed <= tolerance.promise * size
+        converged = converged or idle >= IDLE or (stuck and promised <= NOTHING)
         lost = iteration >= 3 and min(previous - promised, here.cost) > hopeless
         if converged or stuck or lost:
             break
     return Fit(data, here.omega, here.theta, here.cost, converged, iteration, log_determinant(solved.schur))
+
+
+def _descended(here: Point, step_omega: FloatArray, step_theta: FloatArray) -> tuple[float, Point]:
+    """(cost before, where the largest part of a step leads that does not cost more).
+
+    What time skews do is told by the columns of the point before (point()), so that a point that is looked at again
+    with its own may cost more than it seemed to: a step is held against that cost.
+    """
+    scale, previous = 1.0, here.cost
+    while True:
+        trial = point(here.data, here.omega + scale * step_omega, here.theta + scale * step_theta, here.columns)
+        if trial.cost > previous * (1.0 + ROUNDING) and scale == 1.0:
+            previous = max(previous, point(here.data, here.omega, here.theta, here.columns).cost)
+        if trial.cost <= previous * (1.0 + ROUNDING) or scale < SMALLEST_STEP:
+            return previous, trial
+        scale *= 0.25
 
 
 def log_determinant(matrix: FloatArray) -> float:

@@ -4,8 +4,9 @@ Stamps are taken at their word. What they leave open is added to the timing unce
 
     jitter      s/√2 of the deviation s of its own intervals, and of the base's: a frame that waits for the bus is late
                 on average by about as much as its lateness varies, and nobody knows by how much
-    skew        d/√3 between two messages of one rate, d apart: sampled together and sent one after the other, or
-                sampled so? A rectangle from 0 to d about the value d (GUM 4.3.7, F.2.4.5)
+    skew        d/√3 between two messages d apart in a burst of frames, of one rate or of a whole part of it: sampled
+                together and sent one after the other, or sampled so? A rectangle from 0 to d about the value d (GUM
+                4.3.7, F.2.4.5)
     a part      the stated or estimated uncertainty of its offset, where a recording has several files (parts.py)
 
 Interpolation is no delay but an error of the value; it is stated as such.
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, isfinite, nan
+from math import hypot, isfinite, nan, sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -30,6 +31,9 @@ NOMINAL: Final = 0.01
 """Of a ratio of rates: what clocks of a nominal ratio may differ from it (crystals less, RC oscillators more)."""
 SLIDES: Final = 0.25
 """Of an interval: where the time between two clocks' samples changes by more, there is no skew between them."""
+_BLOCKS, _LEAST = 16, 32
+_ALIKE: Final = 0.02  # of an interval: silences of a cycle that differ by less do not tell where a burst begins
+_FOLLOWED: Final = 0.1  # of an interval: jitter up to which a skew is followed through whole intervals
 
 
 @dataclass(frozen=True)
@@ -97,8 +101,9 @@ def align(
     own, other = pace(trace.time, clock), pace(base.time, base_clock)
     p, q = nominal_ratio(other.interval / own.interval)
     drift = other.interval / own.interval * q / p - 1.0
-    apart = _steady_skew(trace.time, base.time, clock) if (p, q) == (1, 1) else nan
     jitter = hypot(clock.jitter, base_clock.jitter) / np.sqrt(2.0)
+    apart = _steady_skew(trace.time, base.time, other.interval, jitter) if p == 1 else nan
+    moved = slip(trace.time, base.time, other.interval, jitter) if p == 1 else (nan, nan)
     sent = abs(apart) / np.sqrt(3.0) if u_part is None and isfinite(apart) else 0.0
     return Alignment(
         channel=trace.channel,
@@ -109,7 +114,52 @@ def align(
         skew=apart,
         u_timing=hypot(jitter, sent, u_part or 0.0),
         u_value=u_value,
+        slip=moved[0],
+        u_slip=moved[1],
     )
+
+
+def in_bursts(found: Mapping[int, Alignment], interval: float) -> dict[int, Alignment]:
+    """The alignments of messages of one log with the base's rate, their skews counted within bursts of frames.
+
+    Messages that were sampled together are sent one after the other: a burst begins behind the longest silence of the
+    cycle. So the third of three messages 0.3 ms apart is 0.6 ms late, not 0.4 ms early, in a cycle of 1 ms.
+    """
+    steady = {i: a.skew % interval for i, a in found.items() if isfinite(a.skew)}
+    at = np.sort([0.0, *steady.values()])
+    silence = np.diff(np.r_[at[-1] - interval, at])
+    nearest = np.max(silence) - silence < _ALIKE * interval
+    if np.count_nonzero(nearest) > 1 or not steady:
+        return dict(found)
+    first = at[int(np.argmax(silence))]
+    base = (0.0 - first) % interval
+    skews = {i: (phase - first) % interval - base for i, phase in steady.items()}
+    return {i: _sent_later(a, skews[i]) if i in skews else a for i, a in found.items()}
+
+
+def _sent_later(a: Alignment, apart: float) -> Alignment:
+    """The alignment with another skew between two messages of a log."""
+    return replace(a, skew=apart, u_timing=sqrt(max(a.u_timing**2 + (apart**2 - a.skew**2) / 3.0, 0.0)))
+
+
+def slip(time: FloatArray, base: FloatArray, interval: float, jitter: float) -> tuple[float, float]:
+    """(largest change, its standard uncertainty) s of the skew of two clocks of one rate beside a steady drift.
+
+    The skew is followed through whole intervals and taken as medians of up to _BLOCKS stretches; the change is the
+    range of these about their straight line. A median of m values of deviation s has s √(π/2m), the difference of two
+    √2 times that. NaN where stamps scatter too much to be followed, or a stretch would have less than _LEAST samples.
+    """
+    apart = _followed(time, base, interval, jitter)
+    blocks = 0 if apart is None else min(_BLOCKS, apart.size // _LEAST)
+    if apart is None or blocks < 3:
+        return nan, nan
+    parts = np.array_split(apart, blocks)
+    at = np.arange(blocks, dtype=np.float64)
+    middle = np.array([np.median(part) for part in parts])
+    left = middle - np.polyval(np.polyfit(at, middle, 1), at)
+    scatter = np.median([np.std(np.diff(part)) for part in parts]) / np.sqrt(2.0)
+    u = scatter * np.sqrt(np.pi / min(part.size for part in parts))
+    return float(np.ptp(left)), float(u)
 
 
 def with_timing(rig: Rig, alignments: Sequence[Alignment]) -> Rig:
@@ -141,14 +191,20 @@ def _note(found: Sequence[Alignment], base: str, base_rate: float, units: Mappin
     )
 
 
-def _steady_skew(time: FloatArray, base: FloatArray, clock: Clock) -> float:
-    """Median skew, NaN where its ends differ by SLIDES of an interval or more."""
-    found = skew(time, base)
+def _followed(time: FloatArray, base: FloatArray, interval: float, jitter: float) -> FloatArray | None:
+    """(m,) s skew() through whole intervals, so that half of one is not folded; None where stamps scatter too much."""
+    return np.unwrap(skew(time, base), period=interval) if jitter <= _FOLLOWED * interval else None
+
+
+def _steady_skew(time: FloatArray, base: FloatArray, interval: float, jitter: float) -> float:
+    """Median skew, NaN where its ends differ by SLIDES of the base's interval or more."""
+    followed = _followed(time, base, interval, jitter)
+    found = skew(time, base) if followed is None else followed
     if found.size < 2:
         return nan
     part = max(found.size // 10, 1)
     moved = abs(float(np.median(found[-part:]) - np.median(found[:part])))
-    return float(np.median(found)) if moved < SLIDES / clock.rate else nan
+    return float(np.median(found)) if moved < SLIDES * interval else nan
 
 
 def _steadiest(time: FloatArray, clock: Clock) -> FloatArray:

@@ -123,6 +123,8 @@ def _on_one_base(
             u_part = u_parts.get(native[i].channel)
             columns[i] = column
             alignments[i] = alignment.align(native[i], clock, native[base], clocks[base], error, u_part)
+    if not u_parts:
+        alignments = alignment.in_bursts(alignments, 1.0 / clocks[base].rate)
     return columns, tuple(alignments[i] for i in sorted(alignments))
 
 
