@@ -6,8 +6,10 @@ record (ASAM MDF bus logging). Time counts from the start of the measurement, as
 
 from __future__ import annotations
 
-import mmap
 import struct
+import sys
+import traceback
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -21,13 +23,11 @@ from nineaudit.readers.can.frames import ERROR, REMOTE, Frames, Int64, Rows, joi
 from nineaudit.readers.can.losses import Losses
 from nineaudit.readers.can.mdf_by_asammdf import by_asammdf
 from nineaudit.readers.can.mdf_layout import layout
+from nineaudit.readers.can.mdf_links import require_whole, unfinished
 from nineaudit.readers.can.mdf_records import read_group
 from nineaudit.readers.contents import cut_short
 
-_HEADER_AT = 64
-_UNFINISHED = b"UnFinMF "
 _KINDS = (("CAN_DataFrame", 0), ("CAN_RemoteFrame", REMOTE), ("CAN_ErrorFrame", ERROR))
-_BLOCK = struct.Struct("<4s4xQQ")  # id, length, number of links; links follow, 8 bytes each
 
 
 def read_mdf(path: Path) -> Frames:
@@ -47,49 +47,47 @@ def opened(path: Path) -> Iterator[Any]:
     """asammdf's view of a whole file; what asammdf stumbles over is a RecordingError."""
     try:
         from asammdf import MDF
-        from asammdf.blocks.utils import MdfException
     except ImportError as error:
         raise ConfigurationError(
             "reading .mf4 needs asammdf", file=path, advice='pip install "nineaudit[mdf]"'
         ) from error
-    _require_whole(path)
+    require_whole(path)
+    opening: tuple[type[Exception], ...] = (*_stumbles(), TypeError, AttributeError)
     try:
-        with MDF(path, process_bus_logging=False) as log:  # type: ignore[call-arg]  # passed on by **kwargs
+        log = MDF(path, process_bus_logging=False)  # type: ignore[call-arg]  # passed on by **kwargs
+    except opening as error:
+        _let_go(error)
+        raise _stumbled(path, error) from error
+    try:
+        with log:
             yield log
-    except (MdfException, ValueError, KeyError, IndexError, struct.error) as error:
-        raise cut_short(path, " ".join(str(error).split())[:120], "no frames") from error
+    except _stumbles() as error:
+        raise _stumbled(path, error) from error
 
 
-def unfinished(path: Path) -> bool:
-    """Whether its logger did not finalise the file."""
-    with path.open("rb") as file:
-        return file.read(len(_UNFINISHED)) == _UNFINISHED
+def _stumbles() -> tuple[type[Exception], ...]:
+    """What asammdf, and the libraries by which it inflates, raise over damaged files."""
+    from asammdf.blocks.utils import MdfException
+
+    own = ((sys.modules.get(module), name) for module, name in (("isal.igzip_lib", "IsalError"), ("zstd", "Error")))
+    inflating = [getattr(module, name) for module, name in own if module]
+    general = (ValueError, LookupError, ArithmeticError, RuntimeError, MemoryError, EOFError, struct.error, zlib.error)
+    return (MdfException, *general, *inflating)
 
 
-def _require_whole(path: Path) -> None:
-    """Follow every link between blocks: asammdf leaves open files behind where it stumbles over a cut one.
+def _let_go(error: Exception) -> None:
+    """Close what asammdf leaves behind where it stumbles: files, and a copy of a log that was not finalised. Its own
+    close() misses what it had not read yet, or has let go."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        half: Any = frame.f_locals.get("self")
+        if type(half).__name__ == "MDF4":
+            for name in ("_file", "header", "identification"):
+                vars(half).setdefault(name, None)
+            half.close()
 
-    In a file that its logger did not finalise the last data block is open: it ends with the file.
-    """
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        _follow(path, data, data[: len(_UNFINISHED)] == _UNFINISHED)
 
-
-def _follow(path: Path, data: mmap.mmap, unfinished: bool) -> None:
-    todo, seen = [_HEADER_AT], set[int]()
-    while todo:
-        at = todo.pop()
-        if at in seen or at == 0:
-            continue
-        seen.add(at)
-        if at + _BLOCK.size > len(data):
-            raise cut_short(path, f"it ends before byte {at}", "no frames", place=f"byte {len(data)}")
-        name, length, links = _BLOCK.unpack_from(data, at)
-        if unfinished and name == b"##DT":
-            continue
-        if name[:2] != b"##" or _BLOCK.size + 8 * links > length or at + length > len(data):
-            raise cut_short(path, "a block is not whole", "no frames", place=f"byte {at}")
-        todo += struct.unpack_from(f"<{links}Q", data, at + _BLOCK.size)
+def _stumbled(path: Path, error: Exception) -> RecordingError:
+    return cut_short(path, " ".join(str(error).split())[:120] or type(error).__name__, "no frames")
 
 
 def holds_frames(log: Any) -> bool:
