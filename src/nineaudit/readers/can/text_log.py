@@ -11,7 +11,7 @@ from typing import Final
 from nineaudit.errors import RecordingError
 from nineaudit.recording import Damage
 
-BLOCK: Final = 1 << 22
+BLOCK: Final = 1 << 21
 NOT_READ: Final = "neither a frame nor a line of a known kind"
 _SHOWN: Final = 60
 _UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
