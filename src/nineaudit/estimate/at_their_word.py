@@ -136,15 +136,14 @@ class Word:
         through = by_omega if self.slope is None else by_omega + self.slope.T @ by_alpha
         return float(np.hypot(found, self.in_time.smoothed_away(through)))
 
-    def rows(self, gradient: Gradient) -> dict[str, float]:
-        """Standard uncertainty of an output with this gradient, by source."""
-        by_reading = self.coefficients(gradient)
+    def by_channel(self, by_reading: FloatArray, _: Gradient) -> dict[str, FloatArray]:
+        """(k,) standard uncertainty that each channel brings by each source, from the coefficients (n,k)."""
         parts = np.matmul(by_reading.T[:, None, :], self.columns)[:, 0]
         out = {
-            source: float(np.linalg.norm(parts[:, [calibration.PARAMETERS.index(m) for m in members]]))
+            source: np.linalg.norm(parts[:, [calibration.PARAMETERS.index(m) for m in members]], axis=1)
             for source, members in calibration.SOURCES.items()
         }
-        return out | {"noise": float(np.sqrt((by_reading**2 @ self.sigma**2).sum()))}
+        return out | {"noise": np.linalg.norm(by_reading, axis=0) * self.sigma}
 
 
 def at_their_word(

@@ -15,7 +15,7 @@ not count. One function, `rows`, is behind `nineaudit budget` and rule UB401.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -37,6 +37,8 @@ DRAWN = (*calibration.SOURCES, "noise", "quantisation")
 """The rows that differ from draw to draw of an instrument."""
 
 Rows = dict[str, float]
+ByChannel = dict[str, FloatArray]
+"""Source -> (k,) standard uncertainty that each channel brings by it."""
 
 
 class Way(Protocol):
@@ -49,8 +51,8 @@ class Way(Protocol):
     def coefficients(self, gradient: Gradient) -> FloatArray:
         """(n,k) what one unit of each reading adds to an output with this gradient."""
 
-    def rows(self, gradient: Gradient) -> Rows:
-        """Its standard uncertainty by calibration and noise."""
+    def by_channel(self, by_reading: FloatArray, gradient: Gradient) -> ByChannel:
+        """Standard uncertainty by calibration and noise of each channel, from the coefficients of its readings."""
 
     def step_error(self, gradient: Gradient) -> float:
         """What the finite step does to it, absolute."""
@@ -100,17 +102,37 @@ def steps(recording: Recording) -> FloatArray:
     return np.where(np.isfinite(stated), stated, found)
 
 
+def by_channel(way: Way, gradient: Gradient, errors: Beyond) -> ByChannel:
+    """What each channel brings to the standard uncertainty of an output with this gradient, by source; the squares of a
+    source add up to that of its row. What filters and the finite step do is of the array as a whole."""
+    return _parts(way, gradient, errors, way.coefficients(gradient))
+
+
+def _parts(way: Way, gradient: Gradient, errors: Beyond, by_reading: FloatArray) -> ByChannel:
+    known = way.by_channel(by_reading, gradient)
+    rounded = np.linalg.norm(by_reading, axis=0) * errors.rounding
+    left = known["noise"] ** 2 - np.where(errors.counted, rounded**2, 0.0)
+    return known | {"noise": _rest(left), "quantisation": rounded}
+
+
+def _rest(squares: FloatArray) -> FloatArray:
+    """Roots of what is left of each, none below 0, that together are as large as what is left of all of them."""
+    kept, whole = np.maximum(squares, 0.0), max(float(squares.sum()), 0.0)
+    return np.asarray(np.sqrt(kept * (whole / kept.sum() if kept.any() else 0.0)))
+
+
 def rows(way: Way, gradient: Gradient, errors: Beyond) -> Rows:
     """Standard uncertainty of an output with this gradient, by ROWS."""
-    known, by_reading = way.rows(gradient), way.coefficients(gradient)
-    rounded = (by_reading**2).sum(axis=0) * errors.rounding**2
-    noise = known["noise"] ** 2 - float(rounded[errors.counted].sum())
-    return known | {
-        "noise": float(np.sqrt(max(noise, 0.0))),
-        "quantisation": float(np.sqrt(rounded.sum())),
-        "filters": abs(float((by_reading * errors.mismatch).sum())),
-        "integration": way.step_error(gradient),
-    }
+    return _both(way, gradient, errors)[0]
+
+
+def _both(way: Way, gradient: Gradient, errors: Beyond) -> tuple[Rows, ByChannel]:
+    """The rows, and what each channel brings to them."""
+    by_reading = way.coefficients(gradient)
+    parts = _parts(way, gradient, errors, by_reading)
+    found = {source: float(np.linalg.norm(u)) for source, u in parts.items()}
+    filters = abs(float((by_reading * errors.mismatch).sum()))
+    return found | {"filters": filters, "integration": way.step_error(gradient)}, parts
 
 
 def total(found: Rows) -> float:
@@ -121,20 +143,21 @@ def total(found: Rows) -> float:
 @dataclass(frozen=True, eq=False)
 class AlphaBudget:
     """Standard uncertainty of the peak of α, rad/s²: the `peak` |α|, its sample `row`, `rows` by source along the
-    direction of the peak, and `total` of them all."""
+    direction of the peak, `total` of them all, and `parts`: what each channel brings to each source."""
 
     peak: float
     row: int
     rows: Rows
     total: float
+    parts: ByChannel = field(default_factory=dict)
 
 
 def alpha_budget(way: Way, time: FloatArray, errors: Beyond) -> AlphaBudget:
     """Budget of the largest |α| of the motion that `way` is about, at `time` (n,) s. EstimationError where it is not
     finite."""
     size = np.linalg.norm(way.motion.alpha, axis=1)
-    found = rows(way, peak_alpha().gradient(way.motion, time), errors)
+    found, parts = _both(way, peak_alpha().gradient(way.motion, time), errors)
     if not np.isfinite(total(found)):
         raise EstimationError("the budget of α is not finite; a position, axis or reading is missing")
     row = int(np.argmax(size))
-    return AlphaBudget(float(size[row]), row, found, total(found))
+    return AlphaBudget(float(size[row]), row, found, total(found), parts)

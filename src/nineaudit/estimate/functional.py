@@ -89,22 +89,31 @@ class Smoothed:
         change = self.coefficients(gradient) * (mean - seen(mean_omega))
         return abs(float(change.sum() + (gradient.omega * (mean_omega - middle)).sum()))
 
-    def rows(self, gradient: Gradient) -> dict[str, float]:
-        """Standard uncertainty of an output with this gradient, by source."""
+    def by_channel(self, by_reading: FloatArray, gradient: Gradient) -> dict[str, FloatArray]:
+        """(k,) standard uncertainty that each channel brings by each source, from the coefficients (n,k).
+
+        The noise of all of them is what the calibration leaves of the variance; each has its part of Σ c²/w².
+        """
         by_omega, v = self._by_unknowns(gradient)
         left = self.known.theta @ v
-        noise = float(by_omega @ self.solved.factor.solve(by_omega[:, None])[:, 0] + v @ left)
-        noise += float(np.einsum("ni,nij,nj->", gradient.a0, self.known.a0, gradient.a0))
-        return self._by_source(left, noise)
+        variance = float(by_omega @ self.solved.factor.solve(by_omega[:, None])[:, 0] + v @ left)
+        variance += float(np.einsum("ni,nij,nj->", gradient.a0, self.known.a0, gradient.a0))
+        out = self._by_calibration(left)
+        noise = max(variance - sum(float((u**2).sum()) for u in out.values()), 0.0)
+        weight = self.known.fit.data.weight
+        share = np.divide(by_reading, weight, out=np.zeros_like(by_reading), where=weight > 0)
+        size = np.linalg.norm(share, axis=0)
+        whole = float(np.linalg.norm(size))
+        return out | {"noise": size * (np.sqrt(noise) / whole if whole > 0 else 0.0)}
 
-    def _by_source(self, left: FloatArray, variance: float) -> dict[str, float]:
-        parameter = self.known.fit.data.active[1]
+    def _by_calibration(self, left: FloatArray) -> dict[str, FloatArray]:
+        channel, parameter = self.known.fit.data.active
+        squares = left[: len(parameter)] ** 2
         out = {}
         for source, members in calibration.SOURCES.items():
             mine = np.isin(parameter, [calibration.PARAMETERS.index(m) for m in members])
-            out[source] = float(np.linalg.norm(left[: len(parameter)][mine]))
-        noise = variance - sum(value**2 for value in out.values())
-        return out | {"noise": float(np.sqrt(max(noise, 0.0)))}
+            out[source] = np.sqrt(np.bincount(channel[mine], squares[mine], len(self.known.fit.data.array)))
+        return out
 
 
 def smoothed(fit: Fit) -> Smoothed:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.finding import COVERAGE_FACTOR, Finding, Verdict
@@ -15,10 +16,13 @@ if TYPE_CHECKING:
     from nineaudit.array import Sensor
     from nineaudit.auditing import Audit
     from nineaudit.bus import Identifier, Load
+    from nineaudit.estimate.budget import AlphaBudget
     from nineaudit.estimate.calibrated import Calibrated
 
 _PULLED = 2.0
 """Standard deviations of the rig's own uncertainty beyond which a fitted calibration error stands out."""
+CONTRIBUTORS = 10
+"""Contributors to the uncertainty that are named; the others are summed up."""
 _HEADS = {
     "gain": "Gain", "zero": "Zero left", "tilt_1": "Tilt 1", "tilt_2": "Tilt 2", "position_x": "Place x",
     "position_y": "Place y", "position_z": "Place z", "timing": "Time",
@@ -94,7 +98,31 @@ def budget(audit: Audit) -> dict[str, Any] | None:
             for name, u in rows
         ],
         "total": quantity(found.total, unit, 2),
+        "contributors": _contributors(found, audit.recording.channels),
     }
+
+
+def _contributors(found: AlphaBudget, names: Sequence[str]) -> list[Row]:
+    """The largest contributors to the variance, a channel and a source each, and what all others are together; filters
+    and the finite step are of the array as a whole."""
+    each = [(names[k], source, float(u)) for source, parts in found.parts.items() for k, u in enumerate(parts)]
+    if not each:
+        return []
+    each += [("whole array", source, u) for source, u in found.rows.items() if source not in found.parts]
+    each = sorted((row for row in each if row[2] > 0), key=lambda row: -row[2])
+    shown, others = each[:CONTRIBUTORS], [u for *_, u in each[CONTRIBUTORS:]]
+    if others:
+        shown.append(("all others", f"{len(others)} of them", math.hypot(*others)))
+    return [
+        {
+            "channel": channel,
+            "source": source,
+            "u": quantity(u, "rad/s^2", 2),
+            "share": f"{digits(100.0 * (u / found.total) ** 2, 2)} %",
+            "bar": f"{100.0 * (u / found.total) ** 2:.1f}%",
+        }
+        for channel, source, u in shown
+    ]
 
 
 def waivers(audit: Audit) -> list[Row]:
