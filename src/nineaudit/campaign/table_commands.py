@@ -18,6 +18,8 @@ from nineaudit.options import example
 
 if TYPE_CHECKING:
     from nineaudit.campaign.compact import Compaction
+    from nineaudit.campaign.index_page import Section
+    from nineaudit.campaign.lake import Lake
 
 LakeOption = Annotated[str, typer.Argument(metavar="LAKE", help="A folder, s3://bucket/lake, any place of fsspec.")]
 Edition = Annotated[
@@ -128,7 +130,17 @@ def report(
     opened = open_lake(lake)
     tables = stored(opened)
     if html is not None:
-        reporting.write_index(opened, tables, html)
+        reporting.write_index(opened, tables, html, _sensors(opened))
     if junit is not None:
         reporting.write_junit_file(opened, tables, junit)
     return [str(path) for path in (html, junit) if path is not None], 0
+
+
+def _sensors(lake: Lake) -> list[Section]:
+    """What the tests say together of the sensors; nothing where they say nothing."""
+    from nineaudit.campaign.health.assess import assess
+    from nineaudit.campaign.health.page import section
+    from nineaudit.campaign.lake import entries
+
+    found = assess(entries(lake))
+    return [section(found)] if found.sensors else []

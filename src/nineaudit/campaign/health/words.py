@@ -48,10 +48,10 @@ def sentence(member: Member, found: Deviation) -> str:
         advice += ", calibrate them" if found.beyond else ""
     else:
         advice = _ADVICE[(State.INSPECT if member.is_seat else State.RECALIBRATE) if found.beyond else State.WATCH]
-    return printable(f"{_called(member)}: {what}: {advice}")
+    return printable(f"{called(member)}: {what}: {advice}")
 
 
-def _called(member: Member) -> str:
+def called(member: Member) -> str:
     """A sensor with its seats, a seat by itself."""
     if member.is_seat or not member.serial:
         return member.name
@@ -64,13 +64,13 @@ def text_table(health: Health) -> str:
     rows = [("sensor", "tests", "gain now", "verdict"), *(_row(member) for member in health.sensors)]
     lines = _aligned(rows)
     told = [sentence(m, d) for m in (*health.sensors, *health.seats) for d in m.deviations]
-    return "\n".join([*lines, *([""] if told else []), *told, "", *_summary(health)])
+    return "\n".join([*lines, *([""] if told else []), *told, "", *summary(health)])
 
 
 def _row(member: Member) -> tuple[str, str, str, str]:
     level = member.level.get("gain")
     gain = "–" if level is None else amount("gain", *level)
-    return printable(_called(member)), str(member.tests), gain, str(member.state)
+    return printable(called(member)), str(member.tests), gain, str(member.state)
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -78,7 +78,8 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
-def _summary(health: Health) -> list[str]:
+def summary(health: Health) -> list[str]:
+    """How many of each verdict, what cannot be told, and what was left out."""
     lines = [_counted(health)]
     if health.sensors:
         lines.append(
@@ -135,4 +136,4 @@ def _deviation(member: Member, found: Deviation) -> dict[str, Any]:
     return {**words, **numbers, "rivals": list(found.rivals), "sentence": sentence(member, found)}
 
 
-__all__ = ["SCHEMA", "amount", "document", "sentence", "text_table"]
+__all__ = ["SCHEMA", "amount", "called", "document", "sentence", "summary", "text_table"]
