@@ -66,7 +66,7 @@ def find(sources: Sequence[str], parts: Callable[[str | None], Sequence[Part]], 
 def _of(source: str, without: str) -> Iterator[Found]:
     """What one source names."""
     protocol, path, rest = split(source)
-    if not rest and _GLOB & set(path) and not _exists(source):
+    if _GLOB & set(path) and not _exists(source):
         return _in_files(_matches(source), without)
     if not _exists(source):
         raise ConfigurationError("no such file or folder", file=source)
@@ -150,13 +150,13 @@ def _matches(pattern: str) -> Iterator[str]:
 
 def _plain(pattern: str) -> str:
     """The folder of a glob before its first wildcard, as it was written."""
-    protocol, path, _ = split(pattern)
+    protocol, path, rest = split(pattern)
     kept = []
     for part in path.split("/")[:-1]:
         if _GLOB & set(part):
             break
         kept.append(part)
-    return protocol + "/".join(kept) if kept else protocol
+    return f"{protocol}{'/'.join(kept)}{rest}"
 
 
 def _named(folder: str, root: str, full: str) -> str:

@@ -1,0 +1,207 @@
+"""The audit of one recording of a campaign: into a lake, in a process of its own, with limits."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import shutil
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from campaigns import campaign, contents, entries
+from nineaudit.campaign import guard, task
+from nineaudit.campaign import lake as lakes
+from nineaudit.campaign.guard import Limits
+from nineaudit.campaign.settings import collect
+from nineaudit.errors import ConfigurationError
+from nineaudit.files import is_sealed
+
+linux = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(campaign(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def requests_to(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Performs a request of a recording in a process of its own, as a worker does."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    name = task.prepare(lakes.open_lake("lake", create=True), collect("rig.toml"))
+
+    def perform(uri: str, limits: Limits, function: str = "campaign_functions:harmful") -> dict[str, Any]:
+        request = {"uri": uri, "inputs": name, "lake": str(folder / "lake"), "folder": str(folder), "test": {}}
+        return guard.guarded({**request, "resume": False, "reports": "failed"}, limits, function)
+
+    yield perform
+    if guard._OWN.child is not None:
+        guard._let_go(guard._OWN.child)
+
+
+def test_an_entry_is_the_result_under_the_name_of_its_uri(folder: Path) -> None:
+    entry = task.audit_one("tests/T1.csv", "rig.toml", test={"number": "42"})
+    assert entry["schema"] == "nineaudit/lake-entry/1"
+    assert entry["uri"] == entry["result"]["recording"]["path"] == "tests/T1.csv"
+    assert entry["test"] == {"number": "42"}
+    assert entry["result"]["verdict"] in ("pass", "fail", "inconclusive")
+    assert is_sealed(entry["result"])
+    assert str(folder) not in json.dumps(entry)
+
+
+def test_audit_one_can_be_sent_to_any_engine() -> None:
+    assert pickle.loads(pickle.dumps(task.audit_one)) is task.audit_one
+
+
+def test_what_is_in_the_lake_is_not_done_again_until_something_changes(folder: Path) -> None:
+    first = task.audit_one("tests/T1.csv", "rig.toml", lake="lake")
+    before = contents(folder / "lake", ".")
+    again = task.audit_one("tests/T1.csv", "rig.toml", lake="lake")
+    assert (first["kept"], again["kept"]) == (False, True)
+    assert first["key"] == again["key"]
+    assert contents(folder / "lake", ".") == before
+    text = Path("rig.toml").read_text(encoding="utf-8")
+    Path("rig.toml").write_text(text + "# a remark\n", encoding="utf-8")
+    assert not task.audit_one("tests/T1.csv", "rig.toml", lake="lake")["kept"]
+    Path("rig.toml").write_text(text, encoding="utf-8")
+    back = task.audit_one("tests/T1.csv", "rig.toml", lake="lake")
+    assert (back["kept"], back["key"]) == (True, first["key"])
+    assert entries(folder / "lake")["T1.csv"]["key"] == first["key"]
+
+
+def test_what_a_table_says_of_the_test_is_part_of_the_entry(folder: Path) -> None:
+    keys = [task.audit_one("tests/T1.csv", "rig.toml", lake="lake", test={"number": n})["key"] for n in "12"]
+    assert keys[0] != keys[1]
+    assert entries(folder / "lake")["T1.csv"]["test"] == {"number": "2"}
+
+
+def test_resume_trusts_size_and_time_and_nothing_else_does() -> None:
+    file = Path("tests/T1.csv")
+    task.audit_one("tests/T1.csv", "rig.toml", lake="lake")
+    stat, data = file.stat(), file.read_bytes()
+    file.write_bytes(data.replace(b"1", b"2"))
+    os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert task.audit_one("tests/T1.csv", "rig.toml", lake="lake", resume=True)["kept"]
+    assert not task.audit_one("tests/T1.csv", "rig.toml", lake="lake")["kept"]
+    file.write_bytes(data + b"\n")
+    assert not task.audit_one("tests/T1.csv", "rig.toml", lake="lake", resume=True)["kept"]
+
+
+def test_an_unreadable_recording_is_kept_like_any(folder: Path) -> None:
+    Path("tests/broken.mcap").write_bytes(b"no log at all")
+    first = task.audit_one("tests/broken.mcap", "rig.toml", lake="lake")
+    assert (first["verdict"], first["kept"], first["transient"]) == ("not_audited", False, False)
+    assert task.audit_one("tests/broken.mcap", "rig.toml", lake="lake")["kept"]
+    gone = task.audit_one("tests/gone.csv", "rig.toml", lake="lake")
+    assert gone["verdict"] == "not_audited"
+    assert "transient" not in entries(folder / "lake")["gone.csv"]
+
+
+def test_a_configuration_that_is_wrong_for_one_recording_costs_only_that() -> None:
+    Path("tests/bus.blf").write_bytes(b"LOGG" + bytes(200))
+    assert task.audit_one("tests/bus.blf", "rig.toml", lake="lake")["verdict"] == "not_audited"
+
+
+def test_a_report_is_kept_of_those_asked_for(folder: Path) -> None:
+    def reports() -> int:
+        return len(list((folder / "lake" / "reports").glob("*"))) if (folder / "lake" / "reports").exists() else 0
+
+    gate = task.audit_one("tests/T1.csv", "rig.toml", lake="lake", reports="none")["gate"]
+    assert reports() == 0
+    for kind, count in (("failed", 1 if gate == "error" else 0), ("all", 1)):
+        for part in ("results", "editions"):
+            shutil.rmtree(folder / "lake" / part)
+        task.audit_one("tests/T1.csv", "rig.toml", lake="lake", reports=kind)
+        assert reports() == count
+    with pytest.raises(ConfigurationError, match="--reports"):
+        task.audit_one("tests/T1.csv", "rig.toml", lake="lake", reports="some")
+
+
+def test_an_archive_member_is_audited_as_the_file_itself() -> None:
+    with zipfile.ZipFile("all.zip", "w") as archive:
+        archive.write("tests/T1.csv", "deep/T1.csv")
+    uri = "zip://deep/T1.csv::all.zip"
+    inside, outside = task.audit_one(uri, "rig.toml"), task.audit_one("tests/T1.csv", "rig.toml")
+    assert inside["result"]["recording"]["path"] == uri
+    assert inside["key"] == outside["key"]
+    for entry in (inside, outside):
+        del entry["result"]["recording"]["path"], entry["result"]["seal"]
+    assert inside["result"] == outside["result"]
+
+
+def test_a_copy_leaves_no_trace_of_where_it_was() -> None:
+    with zipfile.ZipFile("all.zip", "w") as archive:
+        archive.writestr("deep/broken.mcap", b"no log at all")
+    entry = task.audit_one("zip://deep/broken.mcap::all.zip", "rig.toml")
+    assert entry["result"]["reason"].startswith("zip://deep/broken.mcap: ")
+    assert entry["result"]["recording"]["path"] == "zip://deep/broken.mcap::all.zip"
+
+
+def test_a_waiver_for_another_recording_is_no_finding_of_this() -> None:
+    Path("w.toml").write_text(
+        '[[waiver]]\nrule = "RB301"\nrecordings = "other.csv"\nreason = "r"\napproved_by = "a"\n'
+        "approved_on = 2026-01-01\nexpires = 2099-01-01\n",
+        encoding="utf-8",
+    )
+    found = task.audit_one("tests/T1.csv", "rig.toml", waivers="w.toml")["result"]["findings"]
+    assert [f["verdict"] for f in found if f["rule"] == "WV001"] == ["not_applicable"]
+
+
+@linux
+@pytest.mark.parametrize(
+    ("name", "reason", "attempts"),
+    [
+        ("crashes.csv", "ended by SIGSEGV", 2),
+        ("leaves.csv", "ended with code 7", 2),
+        ("raises.csv", "ZeroDivisionError: this is what it said", 2),
+        ("neverends.csv", "longer than 3 s", 1),
+        ("eats.csv", "more than 500 MiB of memory", 1),
+    ],
+)
+def test_harm_costs_one_recording(requests_to: Any, folder: Path, name: str, reason: str, attempts: int) -> None:
+    limits = Limits(timeout=3.0 if name == "neverends.csv" else 60.0, memory=500 * 2**20, retries=1)
+    done = requests_to(f"tests/{name}", limits)
+    assert (done["verdict"], done["transient"], done["attempts"]) == ("not_audited", True, attempts)
+    assert reason in done["reason"]
+    entry = entries(folder / "lake")[name]
+    assert entry["transient"]
+    assert reason in entry["reason"] == entry["result"]["reason"]
+    good = requests_to("tests/T1.csv", Limits())
+    assert (good["kept"], good["attempts"], good["transient"]) == (False, 1, False)
+
+
+@linux
+def test_a_pipe_without_end_is_given_up_and_tried_again_later(requests_to: Any, folder: Path) -> None:
+    os.mkfifo("tests/P.csv")
+    done = requests_to("tests/P.csv", Limits(timeout=4.0), guard.FUNCTION)
+    assert "longer than 4 s" in done["reason"]
+    Path("tests/P.csv").unlink()
+    Path("tests/T1.csv").rename("tests/P.csv")
+    later = requests_to("tests/P.csv", Limits(timeout=60.0), guard.FUNCTION)
+    assert not later["transient"]
+    assert len(contents(folder / "lake")) == 1, "the entry of the attempt goes when there is a better one"
+
+
+@linux
+def test_a_process_ends_with_the_one_that_asks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    child = guard.start("campaign_functions:harmful")
+    child.requests.write(json.dumps({"uri": "neverends"}) + "\n")
+    child.requests.close()
+    assert child.process.wait(timeout=60) == 0
+    child.errors.close()
+
+
+def test_a_lake_of_another_kind_is_named() -> None:
+    with pytest.raises(ConfigurationError, match="is no lake"):
+        lakes.open_lake("tests")
+    Path("tests/lake.json").write_text('{"schema": "nineaudit/lake/9"}', encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="nineaudit/lake/1"):
+        lakes.open_lake("tests", create=True)
