@@ -18,8 +18,9 @@ from nineaudit.campaign.health.select import Selection, select
 from nineaudit.finding import COVERAGE_FACTOR
 
 TOLERANCE: Final = 0.01
-TOGETHER: Final = -0.9
-"""Correlation of a sensor's tilt and its seat's below which they are not told apart."""
+TOGETHER: Final = 0.9
+"""Posterior over prior variance of the difference of a sensor's tilt and its seat's, above which they are not told
+apart: their sum is all that a sensor which never moves shows."""
 
 
 class State(StrEnum):
@@ -88,7 +89,11 @@ class Health:
 
 def assess(entries: Iterable[Mapping[str, Any]], tolerance: float = TOLERANCE) -> Health:
     """The health of the sensors of a campaign, from the entries of its lake. `tolerance` of a gain, relative."""
-    known = read_records(entries)
+    return assess_records(read_records(entries), tolerance)
+
+
+def assess_records(known: Records, tolerance: float = TOLERANCE) -> Health:
+    """The same, from what was read of the entries."""
     if not known.records:
         return Health((), (), tuple(known.notes), {}, 0, known.dated, tolerance)
     chosen = select(parts(known.records), len(known.records))
@@ -182,9 +187,9 @@ def _state(changed: Sequence[Deviation], is_seat: bool, tests: int) -> State:
 
 
 def _apart(solution: Solution, sat: Mapping[Key, set[Seat]]) -> dict[Key, bool]:
-    """Whether the tilts of a sensor and of its seats are told apart: by the correlation of the posterior."""
+    """Whether the tilts of a sensor and of all its seats are told apart: by the posterior of their difference."""
     unknowns = solution.part.unknowns
-    sd = np.sqrt(np.diag(solution.cov))
+    prior, cov = solution.part.prior, solution.cov
     seat = {(u.parameter, u.seat): i for i, u in enumerate(unknowns) if u.seat}
     out: dict[Key, bool] = {}
     for i, unknown in enumerate(unknowns):
@@ -192,7 +197,8 @@ def _apart(solution: Solution, sat: Mapping[Key, set[Seat]]) -> dict[Key, bool]:
             continue
         for place in sat[False, unknown.sensor]:
             j = seat.get((unknown.parameter, place))
-            joined = j is not None and solution.cov[i, j] < TOGETHER * sd[i] * sd[j]
+            left = 0.0 if j is None else (cov[i, i] + cov[j, j] - 2.0 * cov[i, j]) / (prior[i] ** 2 + prior[j] ** 2)
+            joined = left > TOGETHER
             for key in ((False, unknown.sensor), (True, seat_name(place))):
                 out[key] = out.get(key, True) and not joined
     return out
