@@ -23,9 +23,9 @@ class Column(NamedTuple):
     there: BoolArray
 
     def floats(self) -> FloatArray:
-        """(n,) float64, NaN where there is none."""
+        """(n,) float64, NaN where there is none; the column's own values, if they are that already."""
         if self.there.all():
-            return self.values.astype(np.float64)
+            return self.values.astype(np.float64, copy=False)
         out = np.full(len(self.values), np.nan)
         out[self.there] = self.values[self.there]
         return out

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from nineaudit.array import FloatArray, frozen
+from nineaudit.array import FloatArray, read_only
 from nineaudit.errors import RecordingError
 from nineaudit.identity import began, moment, stated
 from nineaudit.provenance import parse
@@ -50,11 +50,12 @@ def read_mcap(path: Path, rig: Rig) -> Contents:
     places = [_place(sensor.signal, sensor.channel, topics) for sensor in rig.array.sensors]
     used = {topic: _streams(topics, topic) for topic in dict.fromkeys(topic for topic, _ in places)}
     clocks, base, notes = _clocks(used, rig, book.origin)
+    times = {topic: read_only(time[timed]) for topic, (time, timed) in clocks.items()}
     traces = []
     for sensor, (topic, name) in zip(rig.array.sensors, places, strict=True):
-        time, timed = clocks[topic]
-        values = frozen(_values(used[topic], name)[timed])
-        traces.append(Trace(sensor.channel, f"{topic}:{name}", frozen(time[timed]), values))
+        timed, values = clocks[topic].there, _values(used[topic], name)
+        values = read_only(values if timed.all() else values[timed])
+        traces.append(Trace(sensor.channel, f"{topic}:{name}", times[topic], values))
     counts = _counts(book, topics, used) | {
         "messages_without_time": sum(int(np.count_nonzero(~timed)) for _, timed in clocks.values()),
         "invalid_values": sum(int(np.count_nonzero(np.isnan(t.values))) for t in traces),

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from nineaudit.array import BoolArray
 from nineaudit.readers.mcap import parse as parse
 from nineaudit.readers.mcap.book import Book, define, other_record
 from nineaudit.readers.mcap.chunk import Messages, inflated, messages, messages_at
@@ -175,9 +176,10 @@ def _by_channel(data: Data, found: Messages, at: int, book: Book, wanted: Wanted
     order = book.seen + np.arange(len(found.channel))
     book.seen += len(found.channel)
     timed = found.times >= 0
-    for number in _different(found.channel):
-        rows = np.flatnonzero((found.channel == number) & timed)
-        late = int(np.count_nonzero(found.channel == number)) - len(rows)
+    different = _different(found.channel)
+    for number in different:
+        rows, count = _rows(found.channel, number, len(different) == 1, timed)
+        late = count - len(rows)
         if late:
             book.damages.add("a log time after the year 2262", at, count=late, lost=late)
         channel = book.channels.get(number)
@@ -185,8 +187,18 @@ def _by_channel(data: Data, found: Messages, at: int, book: Book, wanted: Wanted
             book.damages.add("a message of a channel that is not described", at, count=len(rows), lost=len(rows))
         book.messages[number] = book.messages.get(number, 0) + len(rows) + late
         if channel is not None and len(rows) and wanted(channel):
-            starts, ends, times, place = (c[rows] for c in (found.starts, found.ends, found.times, order))
+            every = len(rows) == len(order)  # then they stay as they are
+            columns = (found.starts, found.ends, found.times, order)
+            starts, ends, times, place = (c if every else c[rows] for c in columns)
             yield Batch(channel, data, starts, ends, times, place, at)
+
+
+def _rows(channel: Any, number: int, alone: bool, timed: BoolArray) -> tuple[Int64, int]:
+    """Rows of a channel's messages that have a time, and how many it has with or without; `alone`: all are its."""
+    if alone:
+        return np.flatnonzero(timed), len(channel)
+    own = channel == number
+    return np.flatnonzero(own & timed), int(np.count_nonzero(own))
 
 
 def _different(numbers: Any) -> list[int]:

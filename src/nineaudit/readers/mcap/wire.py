@@ -95,7 +95,7 @@ class _Walk:
                 return
             tags, at = self.varint(at, end)
             at = self.fields(tags, rows, at, end, wants, seen)
-            if (at < 0).any():
+            if at.min(initial=0) < 0:
                 self.good[rows[at < 0]] = False
                 rows, at, end = rows[at >= 0], at[at >= 0], end[at >= 0]
 
@@ -103,7 +103,7 @@ class _Walk:
         self, tags: Numbers, rows: Int64, at: Int64, end: Int64, wants: Wants, seen: Mapping[int, Int64]
     ) -> Int64:
         """One field of each message, by its tag: (m,) where the next begins."""
-        if (tags == tags[0]).all() and (at >= 0).all():
+        if (tags == tags[0]).all() and at.min() >= 0:
             return self.field(int(tags[0]), rows, at, end, wants, seen)
         following = np.full(len(rows), -1)
         for tag in np.unique(tags[at >= 0]).tolist():
@@ -121,35 +121,46 @@ class _Walk:
         if wire not in (VARINT, I64, I32):  # groups
             self.odd[rows] = True
             return end
-        size = {I64: 8, I32: 4}.get(wire)
-        values, following = self.varint(at, end) if size is None else (None, np.where(end - at >= size, at + size, -1))
+        values = None
+        if wire == VARINT:
+            values, following = self.varint(at, end)
+        else:
+            following = _behind(at, end, 8 if wire == I64 else 4)
         if want is not None and want.scalar is not None and want.scalar.wire == wire:
             ok = following >= 0
-            got = (
-                number_at(self.data, "<" + want.scalar.dtype)[at[ok]]
-                if values is None
-                else _signed(values[ok], want.scalar)
-            )
-            self.keep(want, rows[ok], got, before)
+            if not ok.all():
+                rows, at, values = rows[ok], at[ok], None if values is None else values[ok]
+            read = number_at(self.data, "<" + want.scalar.dtype)[at] if values is None else _signed(values, want.scalar)
+            self.keep(want, rows, read, before)
         return following
 
     def keep(self, want: Want, rows: Int64, values: Numbers, seen: Int64) -> None:
         """Numbers of a field: the last where it is not repeated, else that of the item."""
+        if not want.repeated:
+            self.put(want.columns.get(0, ()), rows, values)
+            return
         for item, columns in want.columns.items():
-            of = slice(None) if not want.repeated else seen[rows] == item
-            for column in columns:
-                self.values[column][rows[of]] = values[of]
-                self.there[column][rows[of]] = True
+            of = seen[rows] == item
+            self.put(columns, rows[of], values[of])
         seen[rows] += 1
+
+    def put(self, columns: Sequence[int], rows: Int64, values: Numbers) -> None:
+        where = slice(None) if len(rows) == self.count else rows  # which is much faster
+        for column in columns:
+            self.values[column][where] = values
+            self.there[column][where] = True
 
     def stretch(self, want: Want | None, rows: Int64, at: Int64, end: Int64, seen: Int64) -> Int64:
         """A field of stated length: text, a nested message, packed numbers."""
         length, at = self.varint(at, end)
-        fits = (at >= 0) & (length <= (end - at).astype(np.uint64))
-        following = np.where(fits, at + length.astype(np.int64), -1)
+        fits = (at >= 0) & (length <= (end - at).view(np.uint64))
+        following = at + length.view(np.int64)
+        until = following
+        if not fits.all():
+            following[~fits] = -1
+            rows, at, until = rows[fits], at[fits], following[fits]
         if want is None:
             return following
-        rows, at, until = rows[fits], at[fits], following[fits]
         if want.scalar is None:
             self.nested(want, rows, at, until, seen)
         elif want.repeated:
@@ -157,11 +168,15 @@ class _Walk:
         return following
 
     def nested(self, want: Want, rows: Int64, at: Int64, end: Int64, seen: Int64) -> None:
+        before = seen[rows]
         if not want.repeated:
-            self.odd[rows[seen[rows] > 0]] = True  # parts of one message, to be merged
+            self.odd[rows[before > 0]] = True  # parts of one message, to be merged
         for item, inner in want.inner.items():
-            of = seen[rows] == item
-            self.message(rows[of], at[of], end[of], inner)
+            of = before == item
+            if of.all():
+                self.message(rows, at, end, inner)
+            else:
+                self.message(rows[of], at[of], end[of], inner)
         seen[rows] += 1
 
     def packed(self, scalar: Scalar, want: Want, rows: Int64, at: Int64, end: Int64, seen: Int64) -> None:
@@ -172,9 +187,7 @@ class _Walk:
         for item, columns in want.columns.items():
             place = at + (item - seen[rows]) * scalar.size
             of = (place >= at) & (place + scalar.size <= end)
-            for column in columns:
-                self.values[column][rows[of]] = number_at(self.data, "<" + scalar.dtype)[place[of]]
-                self.there[column][rows[of]] = True
+            self.put(columns, rows[of], number_at(self.data, "<" + scalar.dtype)[place[of]])
         seen[rows] += (end - at) // scalar.size
 
     def varint(self, at: Int64, end: Int64) -> tuple[Numbers, Int64]:
@@ -210,6 +223,14 @@ class _Walk:
 
 _SEVEN: Final = np.uint64(0x7F)
 _NONE: Final = np.zeros(0, dtype=np.int64)
+
+
+def _behind(at: Int64, end: Int64, size: int) -> Int64:
+    """(m,) where what follows a number of so many bytes begins."""
+    following = at + size
+    if (following > end).any():
+        following[following > end] = -1
+    return following
 
 
 def _signed(values: Numbers, scalar: Scalar) -> Numbers:
