@@ -130,17 +130,17 @@ def report(
     opened = open_lake(lake)
     tables = stored(opened)
     if html is not None:
-        reporting.write_index(opened, tables, html, _sensors(opened))
+        reporting.write_index(opened, tables, html, _sensors(opened, tables.edition))
     if junit is not None:
         reporting.write_junit_file(opened, tables, junit)
     return [str(path) for path in (html, junit) if path is not None], 0
 
 
-def _sensors(lake: Lake) -> list[Section]:
-    """What the tests say together of the sensors; nothing where they say nothing."""
+def _sensors(lake: Lake, edition: str) -> list[Section]:
+    """What the tests say together of the sensors, where they say something; what is damaged was named by compact."""
+    from nineaudit.campaign.entries import current_entries
     from nineaudit.campaign.health.assess import assess
     from nineaudit.campaign.health.page import section
-    from nineaudit.campaign.lake import entries
 
-    found = assess(entries(lake))
+    found = assess(current_entries(lake, edition, []))
     return [section(found)] if found.sensors else []
