@@ -80,10 +80,12 @@ class Frames:
         short = _words(self.data).take(rows).view(np.uint8).reshape(-1, SHORT)
         if not len(self.long_rows) or not (self.length.take(rows) > SHORT).any():
             return short
-        out = np.zeros((len(rows), LONG), dtype=np.uint8)
-        out[:, :SHORT] = short
         place = np.minimum(np.searchsorted(self.long_rows, rows), len(self.long_rows) - 1)
         held = self.long_rows[place] == rows
+        if held.all():
+            return self.long.take(place, axis=0)
+        out = np.zeros((len(rows), LONG), dtype=np.uint8)
+        out[:, :SHORT] = short
         out[held] = self.long[place[held]]
         return out
 

@@ -10,21 +10,20 @@ import struct
 import sys
 import traceback
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from nineaudit.errors import ConfigurationError, RecordingError
-from nineaudit.readers.can.frames import ERROR, REMOTE, Frames, Int64, Rows, joined
+from nineaudit.readers.can.frames import ERROR, REMOTE, Frames
 from nineaudit.readers.can.losses import Losses
 from nineaudit.readers.can.mdf_by_asammdf import by_asammdf
 from nineaudit.readers.can.mdf_layout import layout
 from nineaudit.readers.can.mdf_links import require_whole, unfinished
 from nineaudit.readers.can.mdf_records import read_group
+from nineaudit.readers.can.merged import merged
 from nineaudit.readers.contents import cut_short
 
 _KINDS = (("CAN_DataFrame", 0), ("CAN_RemoteFrame", REMOTE), ("CAN_ErrorFrame", ERROR))
@@ -115,14 +114,7 @@ def _frames(log: Any, path: Path) -> Frames:
     note = f"time counts from the start of the measurement, {log.header.start_time.isoformat()}"
     highest = max(int(part.bus.max(initial=0)) for part in parts)
     buses = tuple(map(str, range(highest + 1)))
-    whole = joined(parts, buses=buses, notes=(note,), damage=losses.damage())
-    return whole if len(parts) == 1 else whole.take(_merged([part.time for part in parts]))
-
-
-def _merged(times: Sequence[Int64]) -> Rows:
-    """Order of all rows by their stamps that keeps the order of each group, also where its time goes back: a log that
-    restarts must show."""
-    return np.argsort(np.concatenate([np.maximum.accumulate(time) for time in times]), kind="stable")
+    return replace(merged(parts), buses=buses, notes=(note,), damage=losses.damage())
 
 
 def _part(log: Any, index: int, name: str, kind: int, losses: Losses) -> Frames:

@@ -16,8 +16,8 @@ SPARE: Final = 4 + LONG
 """Bytes behind signal data: what begins at any of them can be looked at."""
 KEPT: Final = np.array([(1 << 8 * n) - 1 for n in range(SHORT + 1)], dtype="<u8")
 """Of eight bytes the first n."""
-KEPT_LONG: Final = np.where(np.arange(LONG) < np.arange(LONG + 1)[:, None], 255, 0).astype(np.uint8)
-"""Of 64 bytes the first n."""
+KEPT_LONG: Final = np.where(np.arange(LONG) < np.arange(LONG + 1)[:, None], 255, 0).astype(np.uint8).view(np.uint64)
+"""Of 64 bytes, as eight numbers, the first n."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,10 @@ class InRecords:
             return np.ndarray((self.count,), "<u8", strides=(self.record,), **self.shape)
         return _padded(self._bytes(), SHORT).view("<u8")[:, 0]
 
-    def tail(self, rows: NDArray[np.intp]) -> Bytes:
-        """(len(rows), 64) bytes."""
-        return _padded(self._bytes()[rows], LONG)
+    def tail(self, rows: NDArray[np.intp], out: Bytes) -> None:
+        """Put the bytes of some into (len(rows), 64), and zeros behind them."""
+        out[:, self.most :] = 0
+        out[:, : self.most] = self._bytes() if len(rows) == self.count else self._bytes()[rows]
 
     def _bytes(self) -> Bytes:
         return np.ndarray((self.count, self.most), np.uint8, strides=(self.record, 1), **self.shape)
@@ -78,9 +79,9 @@ class InStore:
         """(n,) first eight bytes as numbers, and what stands behind the data."""
         return _each(self.data, "<u8")[self.at]
 
-    def tail(self, rows: NDArray[np.intp]) -> Bytes:
-        """(len(rows), 64) bytes, and what stands behind the data."""
-        return np.asarray(_each(self.data, f"V{LONG}")[self.at[rows]]).view(np.uint8).reshape(-1, LONG)
+    def tail(self, rows: NDArray[np.intp], out: Bytes) -> None:
+        """Put the bytes of some into (len(rows), 64), and what stands behind the data."""
+        out.view(f"V{LONG}")[:, 0] = _each(self.data, f"V{LONG}")[self.at[rows]]
 
 
 def _each(data: Bytes, dtype: str) -> NDArray[Any]:

@@ -216,6 +216,6 @@ def _payload(part: _Part, data: Any, at: int, count: int, first: int, numbers: A
     if len(long):
         there = slice(part.longs, part.longs + len(long))
         part.long_rows[there] = part.done + long
-        part.long[there] = source.tail(long)
-        part.long[there] &= KEPT_LONG[length[long]]
+        source.tail(long, part.long[there])
+        part.long[there].view(np.uint64)[:] &= KEPT_LONG[length[long]]
         part.longs += len(long)
