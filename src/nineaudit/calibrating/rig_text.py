@@ -15,6 +15,7 @@ from nineaudit.array import Sensor
 from nineaudit.calibrating.changes import Keys
 from nineaudit.errors import ConfigurationError
 from nineaudit.rig import Rig, parse_rig
+from nineaudit.units import factor
 
 _HEADER: Final = re.compile(r"\s*\[\[?\s*[\w.\"-]+\s*\]\]?\s*(#.*)?$")
 _SENSOR: Final = re.compile(r"\s*\[\[\s*sensor\s*\]\]")
@@ -112,7 +113,10 @@ def _meant(sensor: Sensor, after: Rig, changes: Mapping[str, Keys]) -> bool:
         "zero": now.u_zero / now.to_si,
         "axis": now.axis,
         "alignment_deg": np.degrees(now.u_alignment),
+        "position": now.position / factor(after.units.length, "length"),
+        "position_u": now.u_position / factor(after.units.length, "length"),
     }
-    kept = ("kind", "signal", "unit", "serial", "u_timing", "u_position")
+    kept = ("kind", "signal", "unit", "serial", "u_timing", *(() if "position_u" in keys else ("u_position",)))
     same = all(getattr(now, name) == getattr(sensor, name) for name in kept)
+    same = same and ("position" in keys or np.array_equal(now.position, sensor.position))
     return same and all(np.allclose(said[key], value, rtol=1e-6, atol=1e-8) for key, value in keys.items())

@@ -6,14 +6,22 @@ They return what is to be printed, with the exit code. Heavy modules are importe
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from nineaudit.campaign.commands import campaign_app
 from nineaudit.campaign.table_commands import Edition, Ended, LakeOption
 from nineaudit.errors import ConfigurationError
-from nineaudit.options import example
+from nineaudit.options import Force, example
+
+if TYPE_CHECKING:
+    from nineaudit.calibrating.changes import Keys
+    from nineaudit.campaign.health.assess import Health
+    from nineaudit.campaign.health.rig_file import Told
+    from nineaudit.rig import Rig
 
 Tolerance = Annotated[
     float, typer.Option("--tolerance", metavar="R", help="Of a gain, relative: beyond it (less U), recalibrate.")
@@ -47,3 +55,62 @@ def health(
 def _require_tolerance(value: float) -> None:
     if not 0.0 < value < 1.0:
         raise ConfigurationError("tolerance", place="--tolerance", found=value, expected="between 0 and 1, as 0.01")
+
+
+@campaign_app.command("rig", epilog=example("nineaudit campaign rig lake rig.toml --output improved.toml"))
+def rig(
+    lake: LakeOption,
+    rig: Annotated[Path, typer.Argument(metavar="RIG.toml", help="Rig file to start from.")],
+    output: Annotated[Path, typer.Option("--output", metavar="F.toml", help="New rig file.")],
+    edition: Edition = None,
+    force: Force = False,
+) -> Ended:
+    """Write what the tests found of a rig's scales, axes and positions into a new rig file, with its evidence.
+
+    Only numbers that the tests tell; beside it F.toml.evidence.json says where each comes from.
+    """
+    from nineaudit.calibrating.rig_text import calibrated
+    from nineaudit.campaign.health.assess import assess
+    from nineaudit.campaign.health.rig_file import evidence, improved
+    from nineaudit.campaign.lake import entries, head, open_lake
+    from nineaudit.campaign.reporting import lake_name
+    from nineaudit.outputs import protect, require_absent, write_text
+    from nineaudit.report.machine import to_json
+    from nineaudit.rig import load_rig
+
+    beside = output.with_name(f"{output.name}.evidence.json")
+    protect([output, beside], [rig])
+    for path in (output, beside):
+        require_absent(path, force)
+    opened, stated = open_lake(lake), load_rig(rig)
+    found = assess(entries(opened, edition))
+    changes, told = improved(found, stated)
+    if not changes:
+        return [f"the tests tell nothing that {rig} does not say: {output} is not written"], 0
+    about = {"name": lake_name(opened), "edition": edition or head(opened)}
+    notes = _notes(changes, told, found, stated, about)
+    write_text(output, calibrated(stated, changes, notes, output))
+    write_text(beside, to_json(evidence(told, changes, found, stated, about)))
+    return [*notes, f"{output}: the rig with {len(changes)} of {len(stated.array)} channels improved", str(beside)], 0
+
+
+def _notes(
+    changes: Mapping[str, Keys], told: Sequence[Told], health: Health, rig: Rig, about: Mapping[str, str | None]
+) -> list[str]:
+    """Comments on top of the rig file: a line for every number that changed."""
+    from nineaudit.campaign.health.words import amount
+    from nineaudit.report.numbers import printable
+
+    dates = sorted({d for m in health.sensors for d in (m.first, m.last) if d})
+    lines = [
+        f"Improved by nineaudit campaign rig from lake {about['name']}, edition {about['edition']}, "
+        f"{health.tests} tests, {dates[0]} to {dates[-1]},",
+        f"in {rig.path.name if rig.path else rig.name}, SHA-256 {rig.sha256}. Errors that they found, ± at k = 2:",
+    ]
+    for one in (one for one in told if one.channel in changes):
+        said = [f"{p} {amount(p, one.value[p], 2.0 * one.told[p])}" for p in one.value if one.significant(p)]
+        lines.append(f"{one.channel} (sensor {one.sensor}, {one.tests} tests): {', '.join(said)}")
+    left = [one.channel for one in told if one.undecided]
+    if left:
+        lines.append(f"left as they were, for a change that may be another's: {', '.join(left)}")
+    return [printable(line) for line in lines]

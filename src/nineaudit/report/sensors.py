@@ -74,14 +74,14 @@ def _channel(index: int, told: Sensed, rig: Rig, hardest: float | None) -> dict[
         "unit": unit,
         "peak": plain(peak / one),
         "shock": plain(peak if sensor.kind == "accelerometer" else hardest),
-        "scale": plain(_stated(sensor)),
+        "scale": plain(stated_scale(sensor)),
         "position": plain(sensor.position),
         "axis": plain(sensor.axis),
         "calibration": None if told.calibration is None else _errors(told.calibration, index),
     }
 
 
-def _stated(sensor: Sensor) -> float:
+def stated_scale(sensor: Sensor) -> float:
     """Units of the recording per unit of the quantity, as the rig states the sensor: its scale; in mV its sensitivity,
     per g_0 or °/s."""
     rate = sensor.kind == "gyroscope"

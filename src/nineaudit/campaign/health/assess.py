@@ -70,7 +70,7 @@ class Member:
 @dataclass(frozen=True, eq=False)
 class Health:
     """All `sensors` and `seats`, the worst first; `notes`; `scatter` from test to test (SI, by kind and family),
-    `tests` used, `dated`; the `selection` behind it."""
+    `tests` used, `dated`; the `selection` and what was `known` behind it."""
 
     sensors: tuple[Member, ...]
     seats: tuple[Member, ...]
@@ -80,6 +80,7 @@ class Health:
     dated: bool
     tolerance: float
     selection: Selection | None = field(default=None, repr=False)
+    known: Records | None = field(default=None, repr=False)
 
     @property
     def action(self) -> bool:
@@ -106,7 +107,15 @@ def assess_records(known: Records, tolerance: float = TOLERANCE) -> Health:
     if unnamed:
         notes.append(f"known by rig and channel, for want of a serial number: {', '.join(unnamed)}")
     return Health(
-        sensors, seats, tuple(notes), scatter, len(known.records) - len(chosen.outlying), known.dated, tolerance, chosen
+        sensors,
+        seats,
+        tuple(notes),
+        scatter,
+        len(known.records) - len(chosen.outlying),
+        known.dated,
+        tolerance,
+        chosen,
+        known,
     )
 
 

@@ -65,6 +65,16 @@ class Record:
 
 
 @dataclass(eq=False)
+class First:
+    """What rigs said first of each sensor and seat."""
+
+    scale: dict[str, float] = field(default_factory=dict)
+    place: dict[Seat, FloatArray] = field(default_factory=dict)
+    axis: dict[Seat, FloatArray] = field(default_factory=dict)
+    restated: set[str] = field(default_factory=set)
+
+
+@dataclass(eq=False)
 class Records:
     """All that tell something, in order; `dated`, whether that is the order of dates; `notes` on what is left out."""
 
@@ -73,16 +83,7 @@ class Records:
     notes: list[str]
     named: frozenset[str]
     """Sensors that have a serial number."""
-
-
-@dataclass(eq=False)
-class _First:
-    """What rigs said first of each sensor and seat."""
-
-    scale: dict[str, float] = field(default_factory=dict)
-    place: dict[Seat, FloatArray] = field(default_factory=dict)
-    axis: dict[Seat, FloatArray] = field(default_factory=dict)
-    restated: set[str] = field(default_factory=set)
+    first: First = field(default_factory=First)
 
 
 def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
@@ -106,7 +107,7 @@ def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
         (i for i, d in enumerate(days) if d is not None or not dated),
         key=lambda i: (days[i] if dated else 0, _natural(str(kept[i][0].get("number") or "")), _natural(kept[i][1])),
     )
-    first, named, records = _First(), set[str](), []
+    first, named, records = First(), set[str](), []
     for place, i in enumerate(order):
         known, uri, rig, block = kept[i]
         day = days[i]
@@ -116,10 +117,10 @@ def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
         named |= {c["serial"] for c in block["channels"] if c["serial"]}
     if first.restated:
         notes.append(f"stated in other units or settings, compared as stated: {', '.join(sorted(first.restated))}")
-    return Records(records, dated, notes, frozenset(named))
+    return Records(records, dated, notes, frozenset(named), first)
 
 
-def _record(uri: str, label: str, when: float, rig: str, block: Mapping[str, Any], first: _First) -> Record:
+def _record(uri: str, label: str, when: float, rig: str, block: Mapping[str, Any], first: First) -> Record:
     channels = {c["channel"]: c for c in block["channels"]}
     told = block["information"]
     prior = np.array(told["prior"], dtype=np.float64)
@@ -140,12 +141,12 @@ def _sensor(rig: str, channel: Mapping[str, Any]) -> str:
 
 
 def _row(rig: str, channel: Mapping[str, Any], parameter: str, prior: float, seat: Seat) -> Row:
-    axis = tuple(_rounded(channel["axis"]).tolist()) if family(parameter) == "tilt" else ()
+    axis = tuple(rounded(channel["axis"]).tolist()) if family(parameter) == "tilt" else ()
     size = float(prior) / UNIT[family(parameter)]
     return Row(_sensor(rig, channel), seat, channel["kind"], parameter, size, axis)
 
 
-def _seat(rig: str, channel: Mapping[str, Any], first: _First) -> Seat:
+def _seat(rig: str, channel: Mapping[str, Any], first: First) -> Seat:
     """The seat of a channel: another one where the rig has it at another place than before."""
     place, name = np.array(channel["position"], dtype=np.float64), str(channel["channel"])
     for again in range(1, 1000):
@@ -155,14 +156,14 @@ def _seat(rig: str, channel: Mapping[str, Any], first: _First) -> Seat:
     return rig, name
 
 
-def _rounded(axis: Iterable[float]) -> FloatArray:
+def rounded(axis: Iterable[float]) -> FloatArray:
     """A direction to a degree or so, by which tilts of restated axes are compared."""
     rough = np.round(np.array(list(axis), dtype=np.float64), 1) + 0.0
     return np.asarray(rough / np.linalg.norm(rough))
 
 
 def _restated(
-    rows: tuple[Row, ...], channels: Mapping[str, Any], names: list[tuple[str, str]], first: _First
+    rows: tuple[Row, ...], channels: Mapping[str, Any], names: list[tuple[str, str]], first: First
 ) -> tuple[FloatArray, FloatArray]:
     """(p,p) Q and (p,) c of the module's equation."""
     turn, moved = np.eye(len(rows)), np.zeros(len(rows))
@@ -183,7 +184,7 @@ def _restated(
     return turn, moved
 
 
-def _rescaled(sensor: str, scale: float, first: _First) -> float:
+def _rescaled(sensor: str, scale: float, first: First) -> float:
     ratio = float(np.log(scale / first.scale.setdefault(sensor, scale)))
     if abs(ratio) <= SAME_SCALE:
         return ratio
