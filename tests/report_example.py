@@ -80,7 +80,7 @@ def body(n: int) -> SimpleNamespace:
     step = np.gradient(time)[:, None]
     omega = np.cumsum(alpha * step, axis=0)
     a0 = G0 * pulses(time, [[(92, 0.045, 0.008), (-20, 0.08, 0.02)], [(24, 0.05, 0.01)], [(-38, 0.06, 0.012)]])
-    return SimpleNamespace(time=time, omega=omega, alpha=alpha, a0=a0)
+    return SimpleNamespace(time=time, omega=omega, alpha=alpha, a0=a0, method="α of the 3-2-2-2 array, integrated")
 
 
 DAMAGE = Damage("an object that does not begin with LOBJ", "byte 4711", 3, "about 12 frames")
@@ -102,6 +102,8 @@ def told(k: int) -> tuple[AlphaBudget, Calibrated, np.ndarray]:
     """A budget, a calibration in which a1y was left out and a0x is far off, and a map with a pair of twins."""
     rows = {"gain": 52.0, "zero": 21.0, "alignment": 142.0, "position": 34.0, "timing": 3.0, "noise": 59.0,
             "quantisation": 0.0, "filters": 0.0, "integration": 0.0}  # fmt: skip
+    uneven = np.sqrt(np.arange(1.0, k + 1.0) / (0.5 * k * (k + 1)))
+    parts = {source: u * np.roll(uneven, i) for i, (source, u) in enumerate(rows.items()) if i < 7}
     rng = np.random.default_rng(9)
     prior = np.tile([0.005, 0.1 * G0, 0.009, 0.009, 5e-4, 5e-4, 5e-4, 1e-5], (k, 1))
     value, u = prior * rng.standard_normal((k, 8)), 0.7 * prior
@@ -111,7 +113,7 @@ def told(k: int) -> tuple[AlphaBudget, Calibrated, np.ndarray]:
     apart[4, 7] = apart[7, 4] = np.inf
     apart[np.arange(k), np.arange(k)] = np.nan
     return (
-        AlphaBudget(5260.0, 400, rows, float(np.sqrt(sum(v**2 for v in rows.values())))),
+        AlphaBudget(5260.0, 400, rows, float(np.sqrt(sum(v**2 for v in rows.values()))), parts),
         Calibrated(value, u, prior),
         apart,
     )

@@ -21,6 +21,7 @@ from nineaudit import report
 from nineaudit.array import frozen
 from nineaudit.diagnose import Diagnosis, Status
 from nineaudit.physics.spectrum import density
+from nineaudit.provenance import Provenance
 from nineaudit.recording import Damage
 from nineaudit.report.axes import ticks, time_scale
 from nineaudit.report.chart import Band, Chart, Flags, Level, Line
@@ -161,7 +162,7 @@ def test_method_is_ready_to_paste_with_its_references(page: Page) -> None:
     text = page.text[page.text.index("Method The recording T0001.blf") :]
     assert example().recording.source.sha256 in text
     assert "“nine accelerometers" in text
-    assert "a1y was rebuilt at" in text
+    assert "Repair: a1y was rebuilt from the other channels at" in text
     assert "JCGM 106:2012" in text
     assert "Takhounts E. G." in text
     assert "compliant" not in page.text.lower()
@@ -582,3 +583,47 @@ def test_a_recording_without_a_quiet_interval_has_a_report() -> None:
     done = nineaudit.audit(moving)
     assert done.rest is None
     assert "No quiet interval was found or stated: no zero was taken off." in report.render(done)
+
+
+def mended_page(fault: str) -> tuple[nineaudit.Audit, str]:
+    rig = parse_rig(preset_text("naap-3222"))
+    done = nineaudit.audit(simulate(rig, "general", faults=[fault], seed=2).recording)
+    assert done.reconstruction is not None
+    return done, Page(report.render(done)).text
+
+
+def test_a_shift_that_was_undone_is_not_called_rebuilt() -> None:
+    done, text = mended_page("a2x:zero_shift=20")
+    assert done.reconstruction is not None
+    assert done.reconstruction.fault == "zero_shift"
+    assert "Corrected channel The original recording is not altered. The channel was not rebuilt:" in text
+    assert "only the zero shift was undone" in text
+    assert "estimate from the other channels" not in text
+    assert "Rebuilt" not in text
+    verdict = text[: text.index("Identification Not stated")]
+    assert "Repair: in a2x the zero shift was undone at" in verdict
+
+
+def test_a_clipped_channel_is_called_rebuilt_and_the_verdict_says_so() -> None:
+    done, text = mended_page("a1y:clipping=0.5")
+    assert done.reconstruction is not None
+    assert done.reconstruction.fault is None
+    assert "Rebuilt channel The original recording is not altered." in text
+    verdict = text[: text.index("Identification Not stated")]
+    count = int(done.reconstruction.replaced.sum())
+    assert f"Repair: a1y was rebuilt from the other channels at {count} of 2251 samples." in verdict
+    assert done.motion is not None
+    assert f"every channel at its word ({done.motion.method})" in text
+
+
+def test_channels_that_an_earlier_repair_made_are_named_in_the_verdict() -> None:
+    done = healthy()
+    record = {
+        "original": {"sha256": "0" * 64}, "channels": ["a1y"], "method": "rebuilt", "donors": [], "samples_replaced": 3,
+    }  # fmt: skip
+    source = replace(done.recording.source, provenance=Provenance(record, "beside"))
+    text = Page(report.render(replace(done, recording=replace(done.recording, source=source)))).text
+    assert (
+        "Not as measured in this recording: a1y, by an earlier repair."
+        in text[: text.index("Identification Not stated")]
+    )

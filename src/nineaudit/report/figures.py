@@ -12,6 +12,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.finding import COVERAGE_FACTOR
+from nineaudit.report import mended
 from nineaudit.report.chart import Band, Chart, Line
 from nineaudit.report.numbers import digits, edge, quantity, sensor_edge, spelled
 from nineaudit.report.svg import draw
@@ -64,31 +65,31 @@ def _rebuilt_channel(audit: Audit, rebuilt: Reconstruction, m: int) -> list[Figu
     name = rebuilt.channels[m]
     unit, one = sensor_edge(rig.array[name], rig)
     measured, new, u = (a[:, m] / one for a in (rebuilt.measured, rebuilt.rebuilt, rebuilt.u))
-    around = COVERAGE_FACTOR * u
+    around, now = COVERAGE_FACTOR * u, mended.words(rebuilt)["now"]
     whole = Chart(
         key=f"rebuilt-{m}",
-        title=f"{name}: measured and rebuilt",
-        description=f"Peak measured {_peak(measured, unit)}, rebuilt {_peak(new, unit)}; replaced samples shaded.",
+        title=f"{name}: measured and {now}",
+        description=f"Peak measured {_peak(measured, unit)}, {now} {_peak(new, unit)}; replaced samples shaded.",
         time=time,
         unit=spelled(unit),
-        lines=(Line(new, "rebuilt", "rebuilt"), Line(measured, "measured", "measured")),
-        bands=(Band(new - around, new + around, "band", "rebuilt ± 2u"),),
+        lines=(Line(new, "rebuilt", now), Line(measured, "measured", "measured")),
+        bands=(Band(new - around, new + around, "band", f"{now} ± 2u"),),
         shaded=rebuilt.replaced[:, m],
         height=240,
     )
-    figures = [figure(whole, f"{name} as measured, its zero taken off, and as rebuilt; replaced samples are shaded.")]
+    figures = [figure(whole, f"{name} as measured, its zero taken off, and as {now}; replaced samples are shaded.")]
     if (close := _closer(whole, rebuilt.interval)) is not None:
         figures.append(figure(close, f"{name}, the replaced interval closer."))
     difference = replace(
         whole,
         key=f"difference-{m}",
-        title=f"{name}: measured less rebuilt",
+        title=f"{name}: measured less {now}",
         description=f"Largest difference {_peak(measured - new, unit)}.",
-        lines=(Line(measured - new, "difference", "measured − rebuilt"),),
-        bands=(Band(-around, around, "band", "± 2u of the rebuilt channel"),),
+        lines=(Line(measured - new, "difference", f"measured − {now}"),),
+        bands=(Band(-around, around, "band", f"± 2u of the {now} channel"),),
         height=130,
     )
-    return [*figures, figure(difference, f"{name}, measured less rebuilt. Inside the band the two agree.")]
+    return [*figures, figure(difference, f"{name}, measured less {now}. Inside the band the two agree.")]
 
 
 def _closer(chart: Chart, interval: tuple[float, float]) -> Chart | None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nineaudit.report import mended
 from nineaudit.report.numbers import NO_BREAK, digits, quantity, seconds, sensor_edge
-from nineaudit.report.text import joined
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -91,9 +91,9 @@ def _rebuilt(audit: Audit) -> str:
         return ""
     unit, one = sensor_edge(audit.recording.rig.array[new.channels[0]], audit.recording.rig)
     return (
-        f"{joined(new.channels)} was rebuilt at {int(new.replaced.sum())} of {new.replaced.size} samples "
-        f"({new.method}), from {', '.join(new.donors)}, with a standard uncertainty of "
-        f"{quantity(float(new.u_rms) / one, unit, 2)} (rms). The original recording is not altered."
+        f"Repair: {mended.done(new)} ({new.method}; {mended.words(new)['donors'].lower()} "
+        f"{', '.join(new.donors)}), with a standard uncertainty of {quantity(float(new.u_rms) / one, unit, 2)} (rms). "
+        "The original recording is not altered."
     )
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.finding import Verdict
-from nineaudit.report import annex, hypotheses, method, origin, review, tables, tested
+from nineaudit.report import annex, hypotheses, mended, method, origin, review, tables, tested
 from nineaudit.report.channels import gallery
 from nineaudit.report.figures import Figure, constraint_figures, motion_figures, reconstruction_figures
 from nineaudit.report.findings import NOTABLE, WEIGHT, by_rule, channels
@@ -181,6 +181,7 @@ def _tables(audit: Audit) -> dict[str, Any]:
         "candidates": tables.candidates(audit),
         "sensitivity": tables.sensitivity(audit),
         "impact": tables.impact(audit),
+        "methods": tables.methods(audit),
         "families": tables.rule_families(audit),
         "budget": annex.budget(audit),
         "waivers": annex.waivers(audit),
@@ -212,6 +213,7 @@ def banner(audit: Audit) -> dict[str, Any]:
             if rival and diagnosis.channels
             else ""
         ),
+        "repaired": mended.sentences(audit),
         "broken": [
             {"code": g.rule, "verdict": str(g.verdict), "channels": _channels(g)}
             for g in sorted(by_rule(audit.findings), key=lambda g: WEIGHT.index(g.verdict))
@@ -248,17 +250,18 @@ def rebuilt(audit: Audit) -> dict[str, Any] | None:
     rig = audit.recording.rig
     unit, one = sensor_edge(rig.array[new.channels[0]], rig)
     replaced = int(new.replaced.sum())
+    said = mended.words(new)
     facts = [
         ("Channel", joined(new.channels)),
         ("Interval", tables.interval(new.interval)),
         ("Samples replaced", f"{replaced} of {new.replaced.size}"),
         ("Method", new.method),
-        ("Rebuilt from", ", ".join(new.donors)),
+        (said["donors"], ", ".join(new.donors)),
         ("Standard uncertainty u (rms)", quantity(float(new.u_rms) / one, unit, 2)),
     ]
     if math.isfinite(new.bound_ratio):
         facts.append(("Its white-noise part against the Cramér–Rao bound", f"{digits(new.bound_ratio)} times"))
-    return {"facts": facts, "figures": zoomable(reconstruction_figures(audit))}
+    return said | {"facts": facts, "figures": zoomable(reconstruction_figures(audit))}
 
 
 def rig(audit: Audit) -> dict[str, Any]:

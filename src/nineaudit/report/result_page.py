@@ -59,6 +59,11 @@ class ImpactModel(BaseModel):
     unit: str = ""
 
 
+class RepairModel(BaseModel):
+    channels: list[str]
+    method: str = ""
+
+
 class TestModel(BaseModel):
     """Which test it was; keys of identity.KEYS, and "started"."""
 
@@ -87,6 +92,7 @@ class ResultModel(BaseModel):
     diagnosis: DiagnosisModel | None = None
     impact: dict[str, ImpactModel] = {}
     test: TestModel = TestModel()
+    reconstruction: RepairModel | None = None
 
 
 def load_result(path: Path) -> ResultModel:
@@ -122,6 +128,7 @@ def _context(result: ResultModel) -> dict[str, Any]:
         "sentence": result.reason or _sentence(result.diagnosis),
         "lead": LEAD[result.verdict],
         "diagnosis": result.diagnosis,
+        "repaired": _repaired(result.reconstruction),
         "candidates": _candidates(result.diagnosis),
         "sensitivity": _sensitivity(result.diagnosis),
         "impact": [_impact(name, row) for name, row in result.impact.items()],
@@ -135,6 +142,10 @@ def _sentence(diagnosis: DiagnosisModel | None) -> str:
         return ""
     named = tuple(Candidate(tuple(c.channels), c.fault, c.probability or 0.0, 0.0, {}) for c in diagnosis.candidates)
     return headline(Diagnosis(diagnosis.status, tuple(diagnosis.channels), named, diagnosis.reason))
+
+
+def _repaired(done: RepairModel | None) -> str:
+    return "" if done is None else f"Repair: {joined(tuple(done.channels))}: {done.method}."
 
 
 def _candidates(diagnosis: DiagnosisModel | None) -> list[tuple[str, str, str]]:

@@ -171,6 +171,17 @@ def impact(audit: Audit) -> list[Row]:
     return rows
 
 
+def methods(audit: Audit) -> str:
+    """How the results before and after the repair were computed: two schemes, of which the names are given."""
+    before = "" if audit.motion is None else f" ({audit.motion.method})"
+    return (
+        f"As recorded: every channel at its word{before}, as a laboratory would compute it from the recording. After "
+        "the repair: by the whole-record fit behind the repair, with a0 and α from each sample; U is its expanded "
+        "uncertainty (k = 2). The command nineaudit motion fits the recording as it is, fault and all, unless told "
+        "otherwise: the fit shares the fault out among the channels, so that its numbers are neither of these."
+    )
+
+
 def _change(before: float | None, after: float | None) -> str:
     """Error of the value as recorded against the value with the rebuilt channel, per cent."""
     if before is None or after is None or not math.isfinite(before) or not math.isfinite(after) or after == 0:
