@@ -1,0 +1,261 @@
+"""Sensor health over a campaign: the algebra of combined likelihoods, who is accused, what cannot be told apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2
+
+from health_campaigns import Plan, drawn, sensor_in
+from nineaudit.campaign.health.assess import State, assess, assess_records
+from nineaudit.campaign.health.model import Change, parts, solve
+from nineaudit.campaign.health.records import read_records
+from nineaudit.campaign.health.scan import scan, threshold
+from nineaudit.campaign.health.scatter import estimate_scatter
+from nineaudit.campaign.health.words import document, sentence, text_table
+from nineaudit.case import Case
+from nineaudit.estimate.information import information
+from nineaudit.rig import parse_rig, preset_text
+from nineaudit.simulate import simulate
+
+SMALL = Plan(rigs=1, channels=3, tests=8, swaps=1, tilts=True)
+TAU = {("accelerometer", "gain"): 0.1, ("accelerometer", "tilt"): 0.05}
+
+
+def test_combined_likelihoods_are_the_joint_least_squares_of_all_unknowns() -> None:
+    """Against a brute-force normal equation of x, of every test's own errors and of a change, all at once."""
+    (part,) = parts(drawn(SMALL, 1).records.records)
+    n = len(part.unknowns)
+    index = np.concatenate([g.index for g in part.groups])
+    assert sorted(index) == list(range(SMALL.tests))
+    rng = np.random.default_rng(5)
+    changes = (Change(0, (np.arange(SMALL.tests) >= 4).astype(float)), Change(3, rng.uniform(size=SMALL.tests)))
+    found = solve(part, TAU, changes)
+
+    width = len(part.groups[0].rows)
+    normal = np.zeros((n + 2 + SMALL.tests * width,) * 2)
+    right = np.zeros(len(normal))
+    normal[np.arange(n), np.arange(n)] = part.prior**-2.0
+    for group in part.groups:
+        for j, place in enumerate(group.index):
+            design = np.zeros((width, len(normal)))
+            design[:, group.at] = group.design
+            for k, change in enumerate(changes):
+                for local in np.flatnonzero(group.at == change.unknown):
+                    design[:, n + k] = group.design[:, local] * change.amount[place]
+            own = n + 2 + width * int(place) + np.arange(width)
+            design[np.arange(width), own] = 1.0
+            normal += design.T @ group.matrix[j] @ design
+            normal[own, own] += 1.0 / group.scatter(TAU)
+            right += design.T @ group.eta[j]
+    cov = np.linalg.inv(normal)
+    np.testing.assert_allclose(found.x, (cov @ right)[: n + 2], rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(found.cov, cov[: n + 2, : n + 2], rtol=1e-7, atol=1e-9)
+
+
+def test_two_halves_of_a_recording_say_what_the_whole_says() -> None:
+    """The prior is in the model once, however many recordings there are."""
+    plan = replace(SMALL, tests=4, swaps=0)
+    whole = drawn(plan, 2).records.records
+    halves = [replace(r, eta=r.eta / 2, matrix=r.matrix / 2) for r in whole for _ in range(2)]
+    nothing = dict.fromkeys(TAU, 0.0)
+    for one, two in zip(parts(whole), parts(halves), strict=True):
+        a, b = solve(one, nothing), solve(two, nothing)
+        np.testing.assert_allclose(a.x, b.x, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(a.cov, b.cov, rtol=1e-9, atol=1e-12)
+
+
+def test_the_likelihood_of_a_recording_does_not_know_the_rig_s_prior() -> None:
+    """About the same point, another stated uncertainty of the gains changes nothing of what the data say (SI)."""
+    rig = parse_rig(preset_text("naap-3222"))
+    found = Case(simulate(rig, "general", seed=3, rate_hz=5000.0).recording).healthy
+    wider = found.data.prior_sd.copy()
+    wider[:, 0] *= 3.0
+    theta = np.where(found.data.active[1] == 0, found.theta / 3.0, found.theta)
+    told = information(found)
+    other = information(replace(found, data=replace(found.data, prior_sd=wider), theta=theta))
+    si = [(i.eta / i.prior, i.matrix / np.outer(i.prior, i.prior)) for i in (told, other)]
+    scale = np.sqrt(np.diag(si[0][1]))
+    np.testing.assert_allclose(si[0][0] / scale, si[1][0] / scale, atol=1e-6)
+    np.testing.assert_allclose(si[0][1] / np.outer(scale, scale), si[1][1] / np.outer(scale, scale), atol=1e-8)
+
+
+def test_predicted_uncertainty_is_the_scatter_about_the_truth() -> None:
+    """Posterior of x against the drawn truth, with its correlations: χ² of all unknowns over many campaigns."""
+    total, count = 0.0, 0
+    for seed in range(12):
+        campaign = drawn(replace(SMALL, tests=30), seed)
+        for part in parts(campaign.records.records):
+            found = solve(part, dict.fromkeys(TAU, 0.09))
+            true = np.array([campaign.truth[u.parameter, u.sensor or u.seat] for u in part.unknowns])
+            error = found.x - true
+            total += float(error @ np.linalg.solve(found.cov, error))
+            count += len(true)
+    assert chi2.ppf(1e-4, count) < total < chi2.ppf(1 - 1e-4, count)
+
+
+def test_scatter_from_test_to_test_is_found() -> None:
+    found = [
+        estimate_scatter(parts(drawn(Plan(rigs=2, tests=80, scatter=s), 4).records.records), [(), ()])[
+            "accelerometer", "gain"
+        ]
+        for s in (0.2, 0.6)
+    ]
+    np.testing.assert_allclose(np.sqrt(found), (0.2, 0.6), rtol=0.3)
+
+
+def test_a_drift_is_found_in_its_sensor_with_its_date_and_the_rest_is_cleared() -> None:
+    found = assess_records(drawn(Plan(), 3, drift=4.0, culprit="S17").records)  # 4 × 0.5 %
+    (member,) = [m for m in found.sensors if m.deviations]
+    (change,) = member.deviations
+    assert (member.name, member.state, change.parameter, change.rivals) == ("S17", State.RECALIBRATE, "gain", ())
+    assert abs(change.value - 0.02) < change.U < 0.005
+    assert change.earliest <= "2026-04-18" <= change.latest
+    assert "S17" in sentence(member, change)
+    assert sentence(member, change).endswith(": recalibrate")
+    assert found.action
+
+
+def test_a_ramp_is_found_too() -> None:
+    found = assess_records(drawn(Plan(), 8, drift=6.0, culprit="S05", ramp=True).records)
+    (member,) = [m for m in found.sensors if m.deviations]
+    assert (member.name, member.deviations[0].shape) == ("S05", "ramp")
+    assert abs(member.deviations[0].value - 0.03) < 2.0 * member.deviations[0].U
+
+
+def test_a_change_inside_the_tolerance_is_watched() -> None:
+    found = assess_records(drawn(Plan(tell=0.3, scatter=0.1), 3, drift=1.0, culprit="S17").records)
+    (member,) = [m for m in found.sensors if m.deviations]
+    assert (member.name, member.state) == ("S17", State.WATCH)
+    assert not found.action
+
+
+def test_one_bad_test_makes_no_drift() -> None:
+    """The last test but two says that a gain is 10 % off: without it nothing is left."""
+    campaign = drawn(Plan(rigs=1, channels=6, tests=60), 2, culprit="S03", outlier=57)
+    found = assess_records(campaign.records)
+    assert [m.name for m in found.sensors if m.deviations] == []
+    assert any("T0057" in note for note in found.notes)
+
+
+def test_a_sensor_that_never_moved_is_not_told_from_its_seat_and_one_that_moved_is() -> None:
+    plan = Plan(rigs=2, channels=6, tests=120, tilts=True)
+    still = assess_records(drawn(plan, 6, drift=4.0, culprit="S04", what="tilt_1").records)
+    assert not any(m.apart for m in (*still.sensors, *still.seats))
+    accused = [m for m in (*still.sensors, *still.seats) if m.deviations]
+    assert {(m.is_seat, m.name, m.state) for m in accused} == {
+        (False, "S04", State.UNDECIDED),
+        (True, "a4 of rig 0", State.UNDECIDED),
+    }
+    assert "cannot be told apart" in text_table(still)
+
+    moved = assess_records(drawn(replace(plan, swaps=3), 6, drift=4.0, culprit="S04", what="tilt_1").records)
+    assert all(m.apart for m in (*moved.sensors, *moved.seats))
+    (member,) = [m for m in (*moved.sensors, *moved.seats) if m.deviations]
+    assert (member.name, member.state) == ("S04", State.RECALIBRATE)
+
+
+def test_static_errors_of_seats_and_sensors_are_separated_by_moving() -> None:
+    plan = Plan(rigs=1, channels=6, tests=80, tilts=True, tell=0.2, scatter=0.1, swaps=3)
+    assert sensor_in(plan, 0, 1, 0) != sensor_in(plan, 0, 1, 79)
+    spread = []
+    for swaps in (0, 3):
+        campaign = drawn(replace(plan, swaps=swaps), 9)
+        (part,) = parts(campaign.records.records)
+        found = solve(part, dict.fromkeys(TAU, 0.01))
+        spread.append([np.sqrt(found.cov[i, i]) for i, u in enumerate(part.unknowns) if u.parameter == "tilt_1"])
+    assert np.median(spread[1]) < 0.8 * np.median(spread[0])
+    assert min(spread[0]) > 0.49  # half of the prior variance stays: 0.5 of the prior sd of the sum
+
+
+def test_nothing_to_tell_is_said() -> None:
+    old = {"uri": "T1.csv", "test": {}, "result": {"verdict": "pass", "rig": {"name": "r"}, "findings": []}}
+    found = assess([old])
+    assert found.sensors == ()
+    assert not found.action
+    assert "1 recordings tell no calibration" in text_table(found)
+    assert document(found)["tests"] == 0
+
+
+def entry(number: int, rig_text: str, day: str | None) -> dict[str, Any]:
+    """A recording of a simulated test, audited, as the lake has it."""
+    import nineaudit as na
+    from nineaudit.report.machine import result_document
+
+    recording = simulate(parse_rig(rig_text), "general", seed=number, rate_hz=4000.0).recording
+    test = {"number": f"T{number}"} | ({} if day is None else {"date": day})
+    return {"uri": f"T{number}.csv", "test": test, "result": result_document(na.audit(recording))}
+
+
+@pytest.fixture(scope="module")
+def told() -> list[dict[str, Any]]:
+    """Three tests, two dated: T10 before T9 by date."""
+    text = preset_text("naap-3222")
+    return [entry(9, text, "2026-02-01"), entry(10, text, "2026-01-01"), entry(2, text, None)]
+
+
+def test_recordings_are_in_the_order_of_dates_else_of_numbers_and_that_is_said(told: list[dict[str, Any]]) -> None:
+    dated = read_records(told)
+    assert [r.label for r in dated.records] == ["2026-01-01", "2026-02-01"]
+    assert "1 recordings without a date are left out" in dated.notes
+    bare = [e | {"test": {"number": e["test"]["number"]}} for e in told]
+    numbered = read_records(bare)
+    assert [r.label for r in numbered.records] == ["T2", "T9", "T10"]
+    assert any("no date" in note for note in numbered.notes)
+    assert "for want of a serial number" in text_table(assess(told))
+
+
+def test_a_scale_that_was_stated_anew_is_no_drift(told: list[dict[str, Any]]) -> None:
+    """A rig that says 1 % more scale has readings 1 % smaller: the sensor is the same."""
+    first = read_records(told[:2]).records[1]
+    stated = told[0] | {"result": told[0]["result"] | {"sensors": _restated(told[0]["result"]["sensors"], 1.01)}}
+    later = read_records([told[1], stated]).records[1]
+    gains = [i for i, row in enumerate(first.rows) if row.parameter == "gain" and row.seat[1] == "a1y"]
+    moved = np.linalg.lstsq(later.matrix, later.eta - first.eta, rcond=None)[0]
+    np.testing.assert_allclose(later.matrix @ moved, later.matrix[:, gains[0]] * np.log(1.01) / 0.005, atol=1e-4)
+
+
+def _restated(block: dict[str, Any], scale: float) -> dict[str, Any]:
+    channels = [c | {"scale": scale * c["scale"]} if c["channel"] == "a1y" else c for c in block["channels"]]
+    return block | {"channels": channels}
+
+
+def test_the_statistic_of_a_change_is_standard_normal_without_one() -> None:
+    """Z of the middle step of every sensor over seeded campaigns."""
+    values = []
+    for seed in range(30):
+        records = drawn(Plan(rigs=1, channels=8, tests=48, scatter=0.3), 100 + seed).records.records
+        (part,) = parts(records)
+        found = scan(solve(part, {("accelerometer", "gain"): 0.09}), len(records))
+        values += [f.z for f in found]
+    worst = np.abs(values)
+    assert len(worst) == 240
+    assert (worst > threshold()).sum() == 0
+    assert np.median(worst) < 3.0
+
+
+@pytest.mark.slow
+def test_false_alarms_are_fewer_than_one_in_a_thousand_sensors() -> None:
+    campaigns, sensors = 60, 40
+    accused = sum(
+        m.state in (State.RECALIBRATE, State.WATCH, State.UNDECIDED)
+        for seed in range(campaigns)
+        for m in assess_records(drawn(Plan(tell=1.5), 20_000 + seed).records).sensors
+    )
+    assert accused <= binom.ppf(0.999, campaigns * sensors, 1e-3)
+
+
+@pytest.mark.slow
+def test_a_drift_of_2_percent_in_one_of_40_is_found_by_its_serial_number() -> None:
+    right = wrong = 0
+    for seed in range(40):
+        culprit = f"S{np.random.default_rng(seed).integers(40):02d}"
+        found = assess_records(drawn(Plan(tell=1.5), 30_000 + seed, 4.0, culprit).records)
+        named = {m.name for m in found.sensors if m.state is State.RECALIBRATE}
+        right += named == {culprit}
+        wrong += bool(named - {culprit})
+    assert right >= binom.ppf(0.01, 40, 0.95)
+    assert wrong <= 1
