@@ -241,7 +241,7 @@ def test_the_unit_of_the_recording_comes_before_that_of_the_rig() -> None:
 
 @pytest.mark.parametrize("unit", ["furlong", "deg/s"])
 def test_an_unknown_unit_names_signal_and_unit(unit: str) -> None:
-    with pytest.raises(ConfigurationError, match=f"signal q: unknown unit of acceleration; found '{unit}'"):
+    with pytest.raises(ConfigurationError, match=f"x.csv: signal q: unknown unit of acceleration; found '{unit}'"):
         assembled(same(), same(), same(), units=(None, unit, None))
 
 
@@ -256,3 +256,9 @@ def test_too_few_samples() -> None:
 def test_no_time_in_common() -> None:
     with pytest.raises(RecordingError, match=r"channel w: no time in common.*'5 s to 5.199 s'.*0 s and 0.199 s"):
         assembled(same(), same(), same(GRID + 5))
+
+
+def test_stamps_that_only_go_back_are_named() -> None:
+    t = np.arange(20.0)[::-1]
+    with pytest.raises(RecordingError, match=r"too few samples.*0 repeat one before them, 19 go back"):
+        assembled((t, t), (t, t), (t, t))

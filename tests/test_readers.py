@@ -177,7 +177,10 @@ def test_a_last_line_without_an_end_is_damage(tmp_path: Path) -> None:
         ("# only\n\n", r"nothing but blank lines and comments"),
         ("", r"the file is empty"),
         ("t_s,p,q\n" + rows(5), r"too few samples; found '5 with a time stamp"),
-        ("t_s,p,q\n" + rows(pattern="x,{p},{q}\n"), r"too few samples; found '0"),
+        (
+            "t_s,p,q\n" + rows(pattern="x,{p},{q}\n"),
+            r"t_s': no row has a time that is a number; found \"first in line 2: 'x'",
+        ),
     ],
 )
 def test_tables_that_cannot_be_read(tmp_path: Path, text: str | bytes, says: str) -> None:

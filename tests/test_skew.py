@@ -190,3 +190,13 @@ def test_a_real_log_of_one_message_has_one_clock(shared_data: Path) -> None:
     rig = load_rig(Path(__file__).parents[1] / "fixtures" / "rigs" / "rav4-kinematics.toml")
     (finding,) = findings(read(folder / "drive-60s.blf", rig, dbc=[folder / "toyota_2017.dbc"]))
     assert finding.verdict is Verdict.NOT_APPLICABLE
+
+
+def test_stamps_too_coarse_to_show_a_drift_say_so() -> None:
+    """Two clocks of even stamps, one of which ended early: nothing is seen, and little could be."""
+    t = np.arange(64) * 1e-3
+    values = np.sin(t)
+    traces = tuple(Trace(c, c, frozen(t[:n]), frozen(values[:n]), "m/s^2") for c, n in (("p", 64), ("q", 30)))
+    recording = assemble(Contents(traces), parse_rig(TWO_MESSAGES), Source(Path("x.csv"), "csv", "", 0))
+    (finding,) = findings(recording)
+    assert (finding.verdict, "too coarse" in finding.reason) == (Verdict.NOT_APPLICABLE, True)

@@ -329,3 +329,72 @@ def test_flipped_and_cut_files_end_in_a_recording_or_one_of_our_errors(tmp_path:
             ends[True] += 1
             assert np.isfinite(found.time).all()
     assert ends[True] > 20
+
+
+# --- found by odd files -------------------------------------------------------------------------------------------
+
+
+def test_readings_without_a_time_are_damage(tmp_path: Path) -> None:
+    """They were left out with a note, and the recording passed."""
+    found = contents(tmp_path, "time,p,q\n" + rows().replace("0.02,", "0.0ÿ2,", 1))
+    (damage,) = found.damage
+    assert (damage.what, damage.count) == ("readings in a row without a time stamp", 1)
+    assert damage.place.startswith("line 4: '0.0ÿ2'")
+
+
+def test_many_rows_without_any_number_are_damage(tmp_path: Path) -> None:
+    """Another decimal mark half way: twenty rows of sixty were gone with a note."""
+    text = "time;p;q\n" + rows().replace(",", ";")
+    lines = text.splitlines(keepends=True)
+    mixed = "".join([lines[0], *(line.replace(".", ",") for line in lines[1:6]), *lines[6:]])
+    found = contents(tmp_path, mixed + "time;p;q\n")
+    whats = [d.what for d in found.damage]
+    assert any("without a time stamp" in what for what in whats), whats
+    said_again = contents(tmp_path, text + "time;p;q\n")
+    assert said_again.damage == ()
+
+
+def test_rows_of_numbers_above_the_names_are_damage(tmp_path: Path) -> None:
+    """A table pasted below another lost the first without a word; two rows may be numbers of channels."""
+    found = contents(tmp_path, rows() + "time,p,q\n" + rows())
+    same(found)
+    (damage,) = found.damage
+    assert (damage.place, damage.count) == ("line 1", COUNT)
+    assert contents(tmp_path, "1,2,3\n4711,4712,4713\ntime,p,q\n" + rows()).damage == ()
+
+
+@pytest.mark.parametrize("mark", ["D", "d"])
+def test_exponents_of_fortran(tmp_path: Path, mark: str) -> None:
+    lines = [
+        f"{i / 100}{mark}+00,{p * 100}{mark}-02,{q / 100}{mark}2\n" for i, (p, q) in enumerate(zip(P, Q, strict=True))
+    ]
+    found = contents(tmp_path, "time,p,q\n" + "".join(lines))
+    np.testing.assert_allclose([t.values for t in found.traces], [P, Q], rtol=1e-12)
+    np.testing.assert_allclose(found.traces[0].time, np.arange(COUNT) / 100, rtol=1e-12)
+
+
+@pytest.mark.parametrize("rate", ["1e400", "1e-320", "0", "-5", "nan"])
+def test_a_rate_that_is_none_gives_no_time(tmp_path: Path, rate: str) -> None:
+    text = "".join(line.split(",", 1)[1] for line in rows().splitlines(keepends=True))
+    with pytest.raises(RecordingError, match="no time column"):
+        contents(tmp_path, f"Sample Rate,{rate}\np,q\n{text}")
+
+
+def test_dates_are_told_apart_from_too_few_samples(tmp_path: Path) -> None:
+    text = "".join(f"2024-01-01T00:00:00.{i:03d},1,2\n" for i in range(COUNT))
+    with pytest.raises(
+        RecordingError, match=r"column 'time': no row has a time that is a number; found .*line 2: '2024-01"
+    ):
+        contents(tmp_path, "time,p,q\n" + text)
+
+
+def test_brackets_that_hold_no_unit_are_told(tmp_path: Path) -> None:
+    found = contents(tmp_path, "time,p [V],q\n" + rows())
+    assert "column 'p [V]': its brackets hold no unit of acceleration and count as its name" in found.notes
+
+
+def test_what_was_found_is_told_in_a_sentence(tmp_path: Path) -> None:
+    """NUL bytes before the names were all of them in the message."""
+    with pytest.raises(RecordingError) as caught:
+        contents(tmp_path, b"\0" * 5000 + b"time,p,q\n" + rows().encode())
+    assert len(str(caught.value)) < 1000

@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 _MISSING = object()
+_LONGEST = 400
 
 
 class NineauditError(Exception):
@@ -33,11 +34,16 @@ class NineauditError(Exception):
         self.found, self.expected, self.advice = found, expected, advice
         head = ": ".join(str(part) for part in (file, place, what) if part)
         tail = [
-            "" if found is _MISSING else f"found {found!r}",
+            "" if found is _MISSING else f"found {_short(repr(found))}",
             f"expected {expected}" if expected else "",
             advice or "",
         ]
         super().__init__("; ".join(part for part in (head, *tail) if part))
+
+
+def _short(text: str) -> str:
+    """What was found may be a file without a line end: its first _LONGEST characters tell enough."""
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"
 
 
 class ConfigurationError(NineauditError):

@@ -105,7 +105,8 @@ def common_time(case: Case, *, coverage: float) -> Sequence[Measure] | NotApplic
     for a in case.recording.alignments:
         covered = coverage * float(np.hypot(case.array[a.channel].u_timing, _base(case).u_timing))
         alike.setdefault((covered, a.drift, a.rate, *np.nan_to_num([a.skew, a.slip])), []).append(a)
-    return [measure for (covered, *_), found in alike.items() for measure in _against_base(case, found, covered)]
+    found = [measure for (covered, *_), group in alike.items() for measure in _against_base(case, group, covered)]
+    return found or NotApplicable("no drift is seen, and the stamps are too coarse or too few to show a small one")
 
 
 def _base(case: Case) -> Sensor:
@@ -114,29 +115,19 @@ def _base(case: Case) -> Sensor:
 
 
 def _against_base(case: Case, alike: Sequence[Alignment], covered: float) -> Iterator[Measure]:
+    """What is measured of one clock: its drift, unless none is seen and none could be, and the change of its skew."""
     one, base = alike[0], _base(case).channel
     channels = tuple(a.channel for a in alike)
     span = float(case.time[-1] - case.time[0])
-    ratio = f"{one.ratio[0]}:{one.ratio[1]}"
-    off = f"{1e6 * one.drift:+.3g} ± {1e6 * one.u_drift:.2g} ppm off {ratio} against {base}"
-    yield Measure(
-        value=abs(one.drift) * span,
-        limit=covered,
-        unit="s",
-        u=one.u_drift * span,
-        channels=channels,
-        detail=f"rate {off}: along {span:.3g} s their time runs apart by",
-    )
+    if 2.0 * one.u_drift * span <= covered or abs(one.drift) > 2.0 * one.u_drift:
+        ratio = f"{one.ratio[0]}:{one.ratio[1]}"
+        off = f"{1e6 * one.drift:+.3g} ± {1e6 * one.u_drift:.2g} ppm off {ratio} against {base}"
+        said = f"rate {off}: along {span:.3g} s their time runs apart by"
+        yield Measure(abs(one.drift) * span, covered, "s", one.u_drift * span, channels, detail=said)
     if np.isfinite(one.slip):
         apart = f"stamped {1e3 * one.skew:.4g} ms after {base}" if np.isfinite(one.skew) else f"skew to {base} slides"
-        yield Measure(
-            value=one.slip,
-            limit=covered,
-            unit="s",
-            u=one.u_slip,
-            channels=channels,
-            detail=f"{apart}, and besides a steady drift that changes by",
-        )
+        said = f"{apart}, and besides a steady drift that changes by"
+        yield Measure(one.slip, covered, "s", one.u_slip, channels, detail=said)
 
 
 def _clocks(case: Case) -> Iterator[tuple[Clock, tuple[str, ...]]]:

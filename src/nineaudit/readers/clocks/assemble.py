@@ -14,9 +14,9 @@ from nineaudit.identity import began, moment
 from nineaudit.readers.clocks import alignment
 from nineaudit.readers.clocks.clock import clock_of, in_order
 from nineaudit.readers.clocks.resample import resample_columns
+from nineaudit.readers.clocks.si import in_si, si_units, stated_units
 from nineaudit.readers.contents import Contents
 from nineaudit.recording import Alignment, Clock, Recording, Source, Trace
-from nineaudit.signals import si_factor
 from nineaudit.units import counted
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 LEAST_SAMPLES: Final = 8
 """Fewer samples than this are no recording."""
-LARGEST: Final = 1e75
-"""m/s² or rad/s beyond which a number is no reading: its fourth power could not be held."""
 LATEST_S: Final = 1e11
 """Seconds (3000 years): a stamp beyond is no time, or not in seconds."""
 EPOCH_S: Final = 1e6
@@ -41,22 +39,22 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     recording's rig (alignment.py). Samples whose stamp is not above all earlier ones are not used, but counted.
     `u_parts`: standard uncertainty, s, of the clock of each channel, where each is in a part of the recording; the time
     base is then that during which all parts were recording.
-    Raises RecordingError: too few samples, or no time that the traces have in common; ConfigurationError: a unit.
+    Raises RecordingError: too few samples, no time that the traces have in common, ConfigurationError: a unit.
     """
     by_channel = {trace.channel: trace for trace in contents.traces}
     traces, notes = _of_our_age([by_channel[sensor.channel] for sensor in rig.array.sensors], source)
     origin, dated = _origin(traces)
-    inside, huge = zip(*(_in_si(trace, rig) for trace in traces), strict=True)
+    inside, huge = zip(*(in_si(trace, rig, source) for trace in traces), strict=True)
     native, clocks = _on_their_clocks(inside, origin)
     shared = _shared(native, source) if u_parts else (-np.inf, np.inf)
     base = max(range(len(native)), key=lambda i: _inside(native[i].time, shared).size)
     time = _inside(native[base].time, shared)
-    _require_samples(time, source)
+    _require_samples(time, clocks[base], source)
     cut = _cut(native[base], time)
     columns, alignments = _on_one_base(time, native, clocks, base, source, u_parts or {})
     readings = read_only(np.column_stack(columns))
-    said = alignment.notes(alignments, native[base].channel, clocks[base].rate, _si_units(rig))
-    stated = _stated_units(contents.traces, rig)
+    said = alignment.notes(alignments, native[base].channel, clocks[base].rate, si_units(rig))
+    stated = stated_units(contents.traces, rig)
     return Recording(
         time=time,
         readings=readings,
@@ -145,10 +143,6 @@ def _equal(one: FloatArray, other: FloatArray) -> bool:
     return one is other or np.array_equal(one, other)
 
 
-def _si_units(rig: Rig) -> dict[str, str]:
-    return {s.channel: "m/s²" if s.kind == "accelerometer" else "rad/s" for s in rig.array.sensors}
-
-
 def _origin(traces: Sequence[Trace]) -> tuple[float, tuple[str, ...]]:
     """What is taken from all stamps, and the note that says so: dates are counted from the first of them."""
     starts = [float(trace.time[0]) for trace in traces if trace.time.size]
@@ -179,18 +173,6 @@ def _of_our_age(traces: Sequence[Trace], source: Source) -> tuple[list[Trace], l
     return kept, notes
 
 
-def _in_si(trace: Trace, rig: Rig) -> tuple[Trace, str]:
-    """Values in SI, calibrated, NaN where there is no number that can be a reading; and what is said of those."""
-    sensor = rig.array[trace.channel]
-    with np.errstate(over="ignore"):
-        values = trace.values * si_factor(sensor, trace.unit)
-        values -= sensor.offset
-    huge = int(np.count_nonzero(np.abs(values) >= LARGEST))
-    values[~(np.abs(values) < LARGEST)] = np.nan
-    said = f"{trace.channel}: {counted(huge, 'number')} beyond {LARGEST:g} m/s² or rad/s, no readings" if huge else ""
-    return replace(trace, values=read_only(values)), said
-
-
 def _on_their_clocks(traces: Sequence[Trace], origin: float) -> tuple[tuple[Trace, ...], tuple[Clock, ...]]:
     """The samples that are used, counted from `origin`, and what each clock did. Traces of one clock share their array
     of stamps, and its analysis."""
@@ -209,13 +191,15 @@ def _on_their_clocks(traces: Sequence[Trace], origin: float) -> tuple[tuple[Trac
     return tuple(native), tuple(clocks)
 
 
-def _require_samples(time: FloatArray, source: Source) -> None:
+def _require_samples(time: FloatArray, clock: Clock, source: Source) -> None:
     if time.size < LEAST_SAMPLES:
+        disorder = f"{clock.duplicates} repeat one before them, {clock.backward} go back"
         raise RecordingError(
             "too few samples",
             file=source.path,
             found=f"{time.size} with a time stamp of their own",
             expected=f"{LEAST_SAMPLES} or more",
+            advice=f"time stamps must increase: {disorder}" if clock.duplicates + clock.backward else None,
         )
 
 
@@ -231,13 +215,3 @@ def _require_overlap(time: FloatArray, trace: Trace, source: Source) -> None:
             found=found,
             expected=f"samples between {time[0]:.6g} s and {time[-1]:.6g} s",
         )
-
-
-def _stated_units(traces: Sequence[Trace], rig: Rig) -> tuple[str, ...]:
-    """A note on the channels whose unit the recording states otherwise than the rig."""
-    other = [
-        f"{t.channel} in {t.unit} (rig: {rig.array[t.channel].unit})"
-        for t in traces
-        if t.unit and t.unit.strip() != rig.array[t.channel].unit
-    ]
-    return (f"units as the recording states them: {', '.join(other)}",) if other else ()

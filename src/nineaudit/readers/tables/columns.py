@@ -15,11 +15,14 @@ from nineaudit.readers.contents import Contents
 from nineaudit.readers.tables.dialect import base
 from nineaudit.readers.tables.preamble import TIME_NAME, unit_in_name
 from nineaudit.recording import Damage, Trace
-from nineaudit.signals import suggestion, time_unit
+from nineaudit.signals import QUANTITY, suggestion, time_unit
 from nineaudit.units import factor
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
+
+_SEVERAL = 3
+"""Rows without any number that may be remarks or names said again; more are rows that were not understood."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,12 @@ def locate(rig: Rig, names: Sequence[str], path: Path, place: str, *, timeless: 
     time = _time_column(rig, names, path, place, timeless)
     channels = tuple(_find(names, s.signal, f"channel {s.channel!r}", path, place) for s in rig.array.sensors)
     units = tuple(unit_in_name(names[i], s.kind) for i, s in zip(channels, rig.array.sensors, strict=True))
-    return with_units(Columns(tuple(names), time, channels, units), rig, {})
+    odd = [
+        f"column {names[i]!r}: its brackets hold no unit of {QUANTITY[s.kind].replace('_', ' ')} and count as its name"
+        for i, s, unit in zip(channels, rig.array.sensors, units, strict=True)
+        if unit is None and names[i] != s.signal
+    ]
+    return with_units(Columns(tuple(names), time, channels, units, notes=tuple(odd)), rig, {})
 
 
 def with_units(columns: Columns, rig: Rig, stated: Mapping[int, str]) -> Columns:
@@ -63,7 +71,8 @@ def with_units(columns: Columns, rig: Rig, stated: Mapping[int, str]) -> Columns
     unit = time_unit(name, rig.time_unit) or stated.get(columns.time)
     unsaid = f"time {name!r} is taken as seconds: neither its name nor the rig gives a unit"
     scale = factor(unit or "s", "time", place=f"column {name!r}")
-    return replace(columns, units=units, scale=scale, notes=() if unit else (unsaid,))
+    kept = tuple(note for note in columns.notes if note != unsaid)
+    return replace(columns, units=units, scale=scale, notes=kept if unit else (*kept, unsaid))
 
 
 def contents(
@@ -73,14 +82,24 @@ def contents(
     values: Sequence[FloatArray],
     notes: Iterable[str],
     damage: Iterable[Damage] = (),
+    first_unplaced: str = "",
 ) -> Contents:
     """Traces of one clock: `time` (n,) in the table's unit, `values` one (n,) a channel; no number is NaN.
 
-    The arrays become those of the traces. Rows without a time stamp are left out and counted; so are, without being
-    left out, cells without a number.
+    The arrays become those of the traces. Rows without a time stamp are left out and counted, and are Damage where they
+    hold readings; `first_unplaced` says where the first is. Cells without a number are counted.
     """
     placed = np.isfinite(time)
     unplaced = int(np.count_nonzero(~placed))
+    held = np.logical_or.reduce([np.isfinite(v) for v in values]) & ~placed
+    if held.any():
+        place = first_unplaced or f"row {int(np.argmax(held)) + 1}"
+        left = Damage("readings in a row without a time stamp", place, int(held.sum()), "these rows are left out")
+        damage = (*damage, left)
+    if unplaced - int(held.sum()) > _SEVERAL:
+        place = first_unplaced or f"row {int(np.argmin(placed | held)) + 1}"
+        nothing = Damage("a row without a time stamp or a reading", place, unplaced - int(held.sum()))
+        damage = (*damage, nothing)
     stamps = time[placed] if unplaced else time
     stamps = _read_only(stamps if columns.scale == 1.0 else stamps * columns.scale)
     readings = [_read_only(_finite(v[placed] if unplaced else v)) for v in values]

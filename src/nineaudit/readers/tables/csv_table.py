@@ -10,17 +10,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nineaudit.array import FloatArray
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.tables import columns, preamble
 from nineaudit.readers.tables.columns import Columns
-from nineaudit.readers.tables.dialect import detect
+from nineaudit.readers.tables.dialect import Dialect, detect, is_number
 from nineaudit.readers.tables.preamble import Surroundings
 from nineaudit.readers.tables.table_rows import Rows
 from nineaudit.readers.tables.text_blocks import BLOCK, Encoding, blocks, encoding_of
+from nineaudit.recording import Damage
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
+
+_SEVERAL = 3
+"""Rows of numbers above the names are readings; fewer may be numbers of channels or sensors."""
 
 
 def read_text_table(path: Path, rig: Rig) -> Contents:
@@ -67,4 +72,32 @@ def _contents(rows: Rows, found: Columns, around: Surroundings, notes: list[str]
         notes.append(f"no column of time: it is counted from 0 at the {rate:g} Hz that {around.place} states")
     else:
         time = values.pop(0)
-    return columns.contents(rig, found, time, values, [*notes, *rows.notes()], rows.damage())
+        _require_times(time, rows, found.time, path)
+    first = rows.first_bad.get(-1 if found.time is None else found.time, "").removeprefix("first in ")
+    damage = (*_above(rows.table), *rows.damage())
+    return columns.contents(rig, found, time, values, [*notes, *rows.notes()], damage, first)
+
+
+def _require_times(time: FloatArray, rows: Rows, column: int, path: Path) -> None:
+    if time.size and not np.isfinite(time).any():
+        raise RecordingError(
+            "no row has a time that is a number",
+            file=path,
+            place=f"column {rows.table.names[column]!r}",
+            found=rows.first_bad.get(column, "no number"),
+            expected="seconds, or another unit that its name or the rig says",
+            advice="export the time as a number, or name another column in the rig file ([recording] time)",
+        )
+
+
+def _above(table: Dialect) -> tuple[Damage, ...]:
+    """Rows of numbers above the row of names: another table, or one that was pasted together."""
+    above = [
+        i
+        for i, line in enumerate(table.lines[: table.header])
+        if len(cells := table.cells(line)) == len(table.names) > 1 and all(is_number(cell) for cell in cells)
+    ]
+    if len(above) < _SEVERAL:
+        return ()
+    what = "a row of numbers above the names of the columns"
+    return (Damage(what, f"line {above[0] + 1}", len(above), "these rows are left out"),)

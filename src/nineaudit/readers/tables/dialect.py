@@ -20,6 +20,7 @@ _DEEPEST: Final = 200
 """Bytes of a file that are its head, and lines of it among which a header row is sought."""
 _DECIMALS: Final = {mark: re.compile(rf"[-+]?\d*{mark}\d+(?:[eE][-+]?\d+)?") for mark in (r"\.", ",")}
 THOUSANDS: Final = re.compile(r"[-+]?\d{1,3}(?:([,.'\u00a0\u202f ’])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
+_EXPONENT: Final = re.compile(r"([\d.])[dD](?=[-+]?\d+\s*$)")
 _SAID: Final = {",": "comma", ";": "semicolon", "\t": "tab", "|": "vertical bar"}
 
 
@@ -117,18 +118,18 @@ def base(name: str) -> str:
 def is_number(cell: str) -> bool:
     """Whether a cell is a finite or infinite number, with a decimal point or comma."""
     try:
-        float(cell.strip().replace(",", "."))
+        float(_EXPONENT.sub(r"\1e", cell.strip().replace(",", ".")))
     except ValueError:
         return False
     return "_" not in cell
 
 
 def number(cell: str, decimal: str) -> float:
-    """The finite number in a cell, NaN for anything else (Python's 1_000 is no number here)."""
+    """The finite number in a cell, NaN for anything else: Python's 1_000 is no number, Fortran's 1.5D+02 is."""
     if decimal == ",":
         cell = "" if "." in cell else cell.replace(",", ".")
     try:
-        value = nan if "_" in cell or not cell.isascii() else float(cell)
+        value = nan if "_" in cell or not cell.isascii() else float(_EXPONENT.sub(r"\1e", cell))
     except ValueError:
         return nan
     return value if isfinite(value) else nan

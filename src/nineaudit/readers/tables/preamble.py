@@ -47,6 +47,8 @@ _SCALE: Final = {
     "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "": 1.0,
 }  # fmt: skip
 _DEEPEST: Final = 50
+_SLOWEST, _FASTEST = 1e-6, 1e12
+"""Hz between which a sampling rate is one."""
 
 
 @dataclass(frozen=True)
@@ -194,5 +196,5 @@ def _rates(line: str) -> Iterator[float]:
         if number is None or scale is None:
             continue
         value = float(number[1].replace(",", ".")) * scale
-        if value > 0:
+        if _SLOWEST < value < _FASTEST if _RATE.match(name) else 1 / _FASTEST < value < 1 / _SLOWEST:
             yield value if _RATE.match(name) else 1 / value
