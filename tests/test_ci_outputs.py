@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+import json
 import re
-from collections.abc import Sequence
+import weakref
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +17,9 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from nineaudit import report
+from nineaudit.checking import Files, Outcome, run
+from nineaudit.engine import gate
+from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.finding import Finding, Measure, Severity, Verdict
 from nineaudit.report.ci import SUMMARY_BYTES
 from report_example import Example, ambiguous, example, healthy
@@ -94,6 +100,15 @@ def test_a_case_fails_where_the_gate_does() -> None:
     assert results([with_findings(found(Verdict.FAIL))], "never") == {"RQ Record quality": ["Failure"]}
 
 
+@pytest.mark.parametrize("severity", ["error", "warning", "info"])
+@pytest.mark.parametrize("verdict", [v for v in Verdict if v is not Verdict.FAIL])
+@pytest.mark.parametrize("fail_on", ["error", "warning"])
+def test_exit_code_and_junit_agree(verdict: Verdict, severity: str, fail_on: str) -> None:
+    audit = with_findings(found(Verdict.PASS), found(verdict, severity))
+    (tags,) = results([audit], fail_on).values()
+    assert (set(tags) <= {"Skipped"}) is gate(audit.findings, fail_on)
+
+
 def test_a_waived_violation_stays_in_the_text_of_its_case() -> None:
     text = report.junit([with_findings(found(Verdict.WAIVED, said="r; waived by A. Example"), found(Verdict.PASS))])
     assert ">waived RQ202 a1y 0.0300 s: r; waived by A. Example</skipped>" in text
@@ -142,3 +157,55 @@ def test_a_summary_is_below_one_mebibyte_whatever_the_input(size: int, mark: str
 def test_a_message_that_is_cut_says_by_how_much() -> None:
     text = report.markdown([with_findings(found(Verdict.FAIL, said="x" * 5000))])
     assert re.search(r"x… \(\d{4} more characters\)", text)
+
+
+def test_outputs_of_all_recordings_keep_no_audit(tmp_path: Path) -> None:
+    """Each audit can be let go once its recording is written: none but the last is alive when the next one comes."""
+    alive: list[weakref.ref[Example]] = []
+
+    def outcomes() -> Iterator[Outcome]:
+        for i in range(5):
+            gc.collect()
+            assert not [x for x in alive[:-1] if x() is not None]
+            made = with_findings(found(Verdict.FAIL, said=f"number {i}"), path=f"T{i}.csv")
+            alive.append(weakref.ref(made))
+            yield Outcome(Path(f"T{i}.csv"), audit=made)
+            del made
+        yield Outcome(Path("lost.csv"), error=RecordingError("the file is empty"))
+
+    for style in ("json", "junit", "github"):
+        shown: list[str] = []
+        files = Files(json_list=tmp_path / "l.json", junit=tmp_path / "j.xml", summary=tmp_path / "s.md")
+        code = run(outcomes(), files, style=style, fail_on="error", many=True, show=shown.append, say=lambda _: None)
+        assert code == 3
+        if style != "github":
+            same = tmp_path / {"json": "l.json", "junit": "j.xml"}[style]
+            assert "".join(shown) == same.read_text(encoding="utf-8")
+    assert [d["recording"]["path"] for d in json.loads((tmp_path / "l.json").read_text(encoding="utf-8"))] == [
+        *(f"T{i}.csv" for i in range(5)),
+        "lost.csv",
+    ]
+    assert len(etree.parse(tmp_path / "j.xml").getroot()) == 6
+    summary = (tmp_path / "s.md").read_text(encoding="utf-8")
+    assert [f"number {i}" in summary for i in range(5)] == [True] * 5
+
+
+def test_a_list_that_is_not_finished_leaves_what_was_there(tmp_path: Path) -> None:
+    def outcomes() -> Iterator[Outcome]:
+        yield Outcome(Path("lost.csv"), error=RecordingError("the file is empty"))
+        raise ConfigurationError("a limit is wrong")
+
+    place = tmp_path / "l.json"
+    place.write_text("before", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="a limit is wrong"):
+        run(
+            outcomes(),
+            Files(json_list=place),
+            style="text",
+            fail_on="error",
+            many=True,
+            show=lambda _: None,
+            say=lambda _: None,
+        )
+    assert place.read_text(encoding="utf-8") == "before"
+    assert [p.name for p in tmp_path.iterdir()] == ["l.json"]

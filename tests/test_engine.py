@@ -11,6 +11,7 @@ import pytest
 
 from cases import recording_of
 from nineaudit import engine
+from nineaudit.auditing import AuditVerdict, judge
 from nineaudit.case import Case
 from nineaudit.engine import gate, run
 from nineaudit.errors import ConfigurationError, EstimationError
@@ -103,7 +104,8 @@ def finding(verdict: str, severity: str) -> Finding:
         ("waived", "error", True, True),
         ("fail", "error", False, False),
         ("warn", "warning", True, False),
-        ("inconclusive", "error", True, False),
+        ("inconclusive", "error", False, False),
+        ("inconclusive", "warning", True, False),
         ("not_evaluated", "error", False, False),
         ("not_evaluated", "warning", True, False),
         ("not_evaluated", "info", True, True),
@@ -112,6 +114,7 @@ def finding(verdict: str, severity: str) -> Finding:
 def test_the_gate(verdict: str, severity: str, error: bool, warning: bool) -> None:
     found = [finding("pass", "error"), finding(verdict, severity)]
     assert (gate(found, "error"), gate(found, "warning"), gate(found, "never")) == (error, warning, True)
+    assert (judge(found) is AuditVerdict.PASS) is error
 
 
 def test_an_unknown_gate_is_an_error() -> None:

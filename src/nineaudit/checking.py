@@ -7,10 +7,16 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from nineaudit.collecting import collecting
 from nineaudit.errors import ConfigurationError, NineauditError
+from nineaudit.outcome import Outcome
 from nineaudit.outputs import each_its_own, make_folder, places, protect, unwritable, write_text
+
+__all__ = [
+    "Files", "Outcome", "audit_each", "files", "load_book", "run", "tally", "write_page",
+]  # fmt: skip
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -18,43 +24,6 @@ if TYPE_CHECKING:
     from nineaudit.rig import Rig
     from nineaudit.rulebook import Rulebook
     from nineaudit.waivers import Waiver
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """One recording of a run: its `audit`, or the `error` for which it could not be audited."""
-
-    path: Path
-    audit: Audit | None = None
-    error: NineauditError | None = None
-
-    @property
-    def verdict(self) -> str:
-        return "not_audited" if self.audit is None else str(self.audit.verdict)
-
-    def document(self) -> dict[str, Any]:
-        """``nineaudit/result/1`` of the audit, or of the failure."""
-        from nineaudit.auditing import versions
-        from nineaudit.report import failure_document, result_document
-
-        if self.error is not None:
-            return failure_document(self.path, self.error, versions())
-        assert self.audit is not None
-        return result_document(self.audit)
-
-    def lines(self) -> list[str]:
-        """What the terminal shows."""
-        from nineaudit.report import lines
-
-        return [f"{self.path.name}: NOT AUDITED"] if self.audit is None else lines(self.audit)
-
-    def exit_code(self, fail_on: str) -> int:
-        """0 gate passed, 1 gate failed, 3 not audited."""
-        from nineaudit.engine import gate
-
-        if self.audit is None:
-            return 3
-        return 0 if gate(self.audit.findings, fail_on) else 1
 
 
 @dataclass(frozen=True)
@@ -165,27 +134,22 @@ def run(
 ) -> int:
     """Write the files, `show` the results in `style` (text, json, jsonl, junit, github), `say` the rest; exit code.
 
-    Outcomes are let go one by one, unless an output speaks of all of them.
+    Outcomes are let go one by one.
     """
     streamed = style in ("text", "jsonl") or (style == "json" and not many)
-    kept: list[Outcome] = []
+    kinds = [(kind, file) for kind, file in files.collected if file is not None]
     verdicts: Counter[str] = Counter()
     code = 0
-    for i, outcome in enumerate(outcomes):
-        if outcome.error is not None:
-            say(str(outcome.error))
-        if streamed:
-            show(_styled(outcome, style))
-        _write_own(outcome, files, i)
-        if not streamed or any(file for _, file in files.collected):
-            kept.append(outcome)
-        verdicts[outcome.verdict] += 1
-        code = max(code, outcome.exit_code(fail_on))
-    if not streamed:
-        show(_collected(style, kept, fail_on))
-    for kind, file in files.collected:
-        if file is not None:
-            write_text(file, _collected(kind, kept, fail_on))
+    with collecting(kinds if streamed else [(style, None), *kinds], fail_on, show) as collect:
+        for i, outcome in enumerate(outcomes):
+            if outcome.error is not None:
+                say(str(outcome.error))
+            if streamed:
+                show(_styled(outcome, style))
+            _write_own(outcome, files, i)
+            collect(outcome)
+            verdicts[outcome.verdict] += 1
+            code = max(code, outcome.exit_code(fail_on))
     if many:
         say(tally(verdicts))
     return code
@@ -217,22 +181,6 @@ def _styled(outcome: Outcome, style: str) -> str:
     if style == "text":
         return "".join(f"{line}\n" for line in outcome.lines())
     return (to_json if style == "json" else to_jsonl)(outcome.document())
-
-
-def _collected(kind: str, outcomes: Sequence[Outcome], fail_on: str) -> str:
-    """One text about all recordings: json (a list), junit, github or markdown."""
-    import json
-
-    from nineaudit import report
-
-    if kind == "json":
-        documents = [outcome.document() for outcome in outcomes]
-        return json.dumps(documents, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    audits = [outcome.audit for outcome in outcomes if outcome.audit is not None]
-    unread = {outcome.path: str(outcome.error) for outcome in outcomes if outcome.error is not None}
-    if kind == "junit":
-        return report.junit(audits, unread, fail_on)
-    return (report.github if kind == "github" else report.markdown)(audits, unread)
 
 
 def tally(verdicts: Mapping[str, int]) -> str:

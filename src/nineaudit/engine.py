@@ -90,8 +90,9 @@ def parameters(check: Check) -> dict[str, type]:
 
 
 def gate(findings: Iterable[Finding], fail_on: str = "error") -> bool:
-    """Whether the findings pass. `fail_on` error: no FAIL and no error-severity rule left unevaluated; warning:
-    also no WARN, nothing inconclusive, no warning-severity rule left unevaluated; never: always True."""
+    """Whether the findings pass. `fail_on` error: no FAIL, and no error-severity rule left undecided (inconclusive or
+    not evaluated, which never counts as a pass: the verdict of such a recording is inconclusive); warning: also no
+    WARN, no warning-severity rule left undecided; never: always True."""
     if fail_on == "never":
         return True
     if fail_on not in ("error", "warning"):
@@ -100,13 +101,11 @@ def gate(findings: Iterable[Finding], fail_on: str = "error") -> bool:
 
 
 def _stops(finding: Finding, fail_on: str) -> bool:
-    if finding.verdict is Verdict.FAIL:
+    undecided = finding.verdict in (Verdict.INCONCLUSIVE, Verdict.NOT_EVALUATED)
+    if finding.verdict is Verdict.FAIL or (undecided and finding.severity is Severity.ERROR):
         return True
-    unevaluated = finding.verdict is Verdict.NOT_EVALUATED
-    if fail_on == "error":
-        return unevaluated and finding.severity is Severity.ERROR
-    doubtful = finding.verdict in (Verdict.WARN, Verdict.INCONCLUSIVE) or unevaluated
-    return doubtful and finding.severity is not Severity.INFO
+    doubtful = finding.verdict is Verdict.WARN or undecided
+    return fail_on == "warning" and doubtful and finding.severity is not Severity.INFO
 
 
 def _apply(rule: Rule, check: Check, case: Case, units: UnitNames) -> list[Finding]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
 from typing import IO, Any
 
@@ -42,21 +43,36 @@ def partial_name(path: Path) -> Path:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a text in UTF-8: all of it is on the disk before it takes its name, and a failure leaves what was there.
+    """Write a text in UTF-8, as written_whole."""
+    with written_whole(path) as put:
+        put(text)
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Callable[[str], None]]:
+    """What takes a text in pieces and writes it in UTF-8: all of it is on the disk before it takes its name, and a
+    failure, of the caller too, leaves what was there.
 
     A link stays and what it points to is written; a device or a pipe is written to as it is. OSError where the folder
     cannot be written to.
     """
     path = path.resolve() if path.is_symlink() else path
-    if path.exists() and not path.is_file():
-        path.write_text(text, encoding="utf-8", newline="\n")
-        return
-    partial = partial_name(path)
+    special = path.exists() and not path.is_file()
+    partial = path if special else partial_name(path)
     try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
-        settle(partial, path)
+        with partial.open("wb", buffering=0) as file:  # without a buffer nothing is left to be written by close
+            yield lambda text: _put(file, text)
+        if not special:
+            settle(partial, path)
     finally:
-        partial.unlink(missing_ok=True)
+        if not special:
+            partial.unlink(missing_ok=True)
+
+
+def _put(file: FileIO, text: str) -> None:
+    left = memoryview(text.encode())
+    while left:
+        left = left[file.write(left) :]
 
 
 def settle(partial: Path, path: Path) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final
 
 from nineaudit.errors import ConfigurationError
-from nineaudit.files import write_whole
+from nineaudit.files import written_whole
 
 STEM: Final = "{stem}"
 
@@ -68,9 +69,32 @@ def make_folder(path: Path) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text in UTF-8, whole or not at all; its folder is made. ConfigurationError where that cannot be."""
+    with writing(path) as put:
+        put(text)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[Callable[[str], None]]:
+    """What takes a text in pieces, which becomes the file once it is whole; its folder is made. ConfigurationError if
+    that cannot be; what the caller raises passes, and leaves what was there."""
     make_folder(path.parent)
+    with ExitStack() as opened:
+        with _told(path):
+            put = opened.enter_context(written_whole(path))
+
+        def take(text: str) -> None:
+            with _told(path):
+                put(text)
+
+        yield take
+        with _told(path):
+            opened.close()
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
     try:
-        write_whole(path, text)
+        yield
     except OSError as error:
         raise unwritable(path, error) from error
 

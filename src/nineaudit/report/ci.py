@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
@@ -20,11 +21,48 @@ if TYPE_CHECKING:
 Unread = Mapping[Path, str]
 """Recordings that could not be audited, and why."""
 
+JUNIT_HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n<testsuites name="nineaudit">\n'
+JUNIT_TAIL = "</testsuites>\n"
 WORST = 10
 SUMMARY_BYTES = 1 << 20
 LONGEST = 2_000
 """Characters of one message of an annotation or a summary; names and reasons come from files of any size."""
 _UNDECIDED = frozenset({Verdict.INCONCLUSIVE, Verdict.NOT_EVALUATED})
+
+
+@dataclass(frozen=True)
+class Digest:
+    """What the annotations and the summary need of a recording: its `path`, the `test` in words, `verdict` and
+    `diagnosis` as sentences, and its `worst` notable findings, ten at the most. `read`: whether it could be audited;
+    if not, `diagnosis` is why."""
+
+    path: Path
+    verdict: str
+    diagnosis: str
+    test: str = ""
+    worst: tuple[Finding, ...] = ()
+    read: bool = True
+
+
+def digest(audit: Audit) -> Digest:
+    """The digest of an audit, which is then needed no more."""
+    telling = [f for f in by_weight(audit.findings) if f.verdict in NOTABLE and f.verdict is not Verdict.WAIVED]
+    return Digest(
+        audit.recording.source.path,
+        audit.verdict.replace("_", " "),
+        diagnosis_sentence(audit.diagnosis),
+        _test(audit),
+        tuple(telling[:WORST]),
+    )
+
+
+def unread_digest(path: Path, reason: str) -> Digest:
+    """The digest of a recording that could not be audited."""
+    return Digest(path, "not audited", reason, read=False)
+
+
+def _digests(audits: Sequence[Audit], unread: Unread | None) -> list[Digest]:
+    return [digest(a) for a in audits] + [unread_digest(path, reason) for path, reason in (unread or {}).items()]
 
 
 def junit(audits: Sequence[Audit], unread: Unread | None = None, fail_on: str = "error") -> str:
@@ -34,22 +72,33 @@ def junit(audits: Sequence[Audit], unread: Unread | None = None, fail_on: str = 
     severity error could not be decided, which never counts as a pass. skipped: a violation is waived, or no rule
     applies. Other notable findings are the case's output.
     """
-    root = ET.Element("testsuites", name="nineaudit")
-    for audit in audits:
-        _suite(root, audit, fail_on)
-    for path, reason in (unread or {}).items():
-        suite = ET.SubElement(root, "testsuite", name=_xml(path.as_posix()))
-        case = ET.SubElement(suite, "testcase", classname=_xml(path.as_posix()), name="read the recording")
-        ET.SubElement(case, "error", message=_xml(reason), type="not_audited").text = _xml(reason)
-    for suite in root:
-        _count(suite)
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+    suites = [junit_suite(audit, fail_on) for audit in audits]
+    suites += [unread_suite(path, reason) for path, reason in (unread or {}).items()]
+    return "".join([JUNIT_HEAD, *suites, JUNIT_TAIL])
 
 
-def _suite(root: ET.Element, audit: Audit, fail_on: str) -> None:
+def junit_suite(audit: Audit, fail_on: str = "error") -> str:
+    """The suite of a recording, as text between JUNIT_HEAD and JUNIT_TAIL."""
+    return _finished(_suite(audit, fail_on))
+
+
+def unread_suite(path: Path, reason: str) -> str:
+    """The suite of a recording that could not be audited, as junit_suite."""
+    suite = ET.Element("testsuite", name=_xml(path.as_posix()))
+    case = ET.SubElement(suite, "testcase", classname=_xml(path.as_posix()), name="read the recording")
+    ET.SubElement(case, "error", message=_xml(reason), type="not_audited").text = _xml(reason)
+    return _finished(suite)
+
+
+def _finished(suite: ET.Element) -> str:
+    _count(suite)
+    ET.indent(suite, level=1)
+    return f"  {ET.tostring(suite, encoding='unicode')}\n"
+
+
+def _suite(audit: Audit, fail_on: str) -> ET.Element:
     path = _xml(audit.recording.source.path.as_posix())
-    suite = ET.SubElement(root, "testsuite", name=path)
+    suite = ET.Element("testsuite", name=path)
     known = audit.recording.test.known
     if known:
         properties = ET.SubElement(suite, "properties")
@@ -59,6 +108,7 @@ def _suite(root: ET.Element, audit: Audit, fail_on: str) -> None:
         name = f"{code} {family_title(code)}"
         case = ET.SubElement(suite, "testcase", classname=path, name=_xml(name))
         _outcome(case, by_weight(findings), fail_on)
+    return suite
 
 
 def _outcome(case: ET.Element, findings: list[Finding], fail_on: str) -> None:
@@ -98,20 +148,24 @@ def _xml(text: str) -> str:
 
 def github(audits: Sequence[Audit], unread: Unread | None = None) -> str:
     """GitHub workflow commands: unreadable recordings, then the worst findings, ten lines at the most."""
-    commands = [_command("error", path, "not audited", reason) for path, reason in (unread or {}).items()]
-    for finding, audit in _worst(audits):
+    return github_of(_digests(audits, unread))
+
+
+def github_of(digests: Sequence[Digest]) -> str:
+    """The same, of digests."""
+    commands = [_command("error", d.path, d.verdict, d.diagnosis) for d in digests if not d.read]
+    for finding, path in _worst(digests):
         level = "error" if finding.verdict is Verdict.FAIL else "warning"
         title = f"{finding.rule} {listed(channels(finding))}".strip()
-        line = finding_line(finding)
-        commands.append(_command(level, audit.recording.source.path, title, line))
+        commands.append(_command(level, path, title, finding_line(finding)))
     return "".join(f"{command}\n" for command in commands[:WORST])
 
 
-def _worst(audits: Sequence[Audit]) -> list[tuple[Finding, Audit]]:
-    """Notable findings of all recordings, the worst first."""
-    owner = {id(finding): audit for audit in audits for finding in audit.findings}
-    every = by_weight(finding for audit in audits for finding in audit.findings)
-    return [(f, owner[id(f)]) for f in every if f.verdict in NOTABLE and f.verdict is not Verdict.WAIVED]
+def _worst(digests: Sequence[Digest]) -> list[tuple[Finding, Path]]:
+    """Notable findings of all recordings, the ten worst first."""
+    owner = {id(finding): d.path for d in digests for finding in d.worst}
+    every = by_weight(finding for d in digests for finding in d.worst)
+    return [(f, owner[id(f)]) for f in every[:WORST]]
 
 
 def _command(level: str, path: Path, title: str, message: str) -> str:
@@ -130,13 +184,15 @@ def _escape_property(text: str) -> str:
 
 def markdown(audits: Sequence[Audit], unread: Unread | None = None) -> str:
     """A job summary: a row per recording, then the worst findings; never more than 1 MiB."""
-    table = [
-        (a.recording.source.path.name, _test(a), f"**{a.verdict.replace('_', ' ')}**", diagnosis_sentence(a.diagnosis))
-        for a in audits
-    ] + [(p.name, "", "**not audited**", reason) for p, reason in (unread or {}).items()]
+    return markdown_of(_digests(audits, unread))
+
+
+def markdown_of(digests: Sequence[Digest]) -> str:
+    """The same, of digests; what could not be audited comes last."""
+    table = [(d.path.name, d.test, f"**{d.verdict}**", d.diagnosis) for d in sorted(digests, key=lambda d: not d.read)]
     shown = [i for i in range(len(_HEADS)) if i != 1 or any(row[1] for row in table)]
     rows = [_row([row[i] if i == _BOLD else _cell(row[i]) for i in shown]) for row in table]
-    items = [f"- {_cell(a.recording.source.path.name)}: {_cell(finding_line(f))}" for f, a in _worst(audits)[:WORST]]
+    items = [f"- {_cell(path.name)}: {_cell(finding_line(f))}" for f, path in _worst(digests)]
     head = ["## nineaudit", "", _row([_HEADS[i] for i in shown]), "|" + "---|" * len(shown)]
     tail = ["", "### Worst findings", "", *items] if items else []
     return _within(head, rows, tail)
