@@ -21,6 +21,7 @@ from typing import Any
 import can
 import cantools
 import numpy as np
+from figures import Figure, table
 
 from nineaudit import can_bits
 from nineaudit.readers.can.asc import read_asc
@@ -29,6 +30,7 @@ from nineaudit.readers.can.frames import Frames
 
 FIGURES = {".log": 20.0, ".asc": 18.0}
 READERS: dict[str, Callable[[Path], Frames]] = {".log": read_candump, ".asc": read_asc}
+NAMES = {".log": "candump", ".asc": "ASC"}
 MEMORY = 160
 IDENTIFIERS = 24
 DATABASE = 'VERSION ""\nNS_ :\nBS_:\nBU_: X\n' + "".join(
@@ -144,10 +146,11 @@ def main() -> None:
             assert all(np.array_equal(found[n], expected[n]) for n in expected if not n.endswith(".time"))
             us, them = fast / asked.count * 1e6, slow / min(asked.part, asked.count) * 1e6
             memory = peak(whole / f"t{suffix}") / asked.count
-            print(
-                f"{suffix}: {us:.2f} µs a frame, python-can and cantools {them:.2f} µs: {them / us:.1f} × (asked"
-                f" {figure:g}); peak {memory:.0f} bytes a frame (asked {MEMORY})"
-            )
+            first = min(asked.part, asked.count)
+            print(f"{suffix}: {us:.2f} µs a frame, python-can and cantools {them:.2f} µs (the first {first} frames)")
+            name = NAMES[suffix]
+            ratio = Figure(f"{name}: python-can and cantools / read, all decoded", them / us, ">=", figure)
+            print(table([ratio, Figure(f"{name}: peak memory, bytes a frame", memory, "<=", MEMORY)]))
 
 
 if __name__ == "__main__":

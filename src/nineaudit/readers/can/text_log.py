@@ -12,6 +12,9 @@ from nineaudit.errors import RecordingError
 from nineaudit.recording import Damage
 
 BLOCK: Final = 1 << 21
+_SMALLEST_BLOCK: Final = 1 << 18
+_BLOCKS: Final = 4
+"""A file is read in so many blocks at least, if they are not small, so that little of it stands in memory twice."""
 NOT_READ: Final = "neither a frame nor a line of a known kind"
 _SHOWN: Final = 60
 _UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
@@ -59,8 +62,9 @@ def blocks(path: Path) -> Iterator[bytes]:
     UTF-16.
     """
     rest, first = b"", True
+    size = min(BLOCK, max(_SMALLEST_BLOCK, path.stat().st_size // _BLOCKS))
     with path.open("rb") as file:
-        while read := file.read(BLOCK):
+        while read := file.read(size):
             read, first = (_text(read, path) if first else read), False
             end = read.rfind(b"\n") + 1
             if not end:
