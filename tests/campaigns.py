@@ -59,4 +59,5 @@ def entries(lake: Path) -> dict[str, dict[str, Any]]:
 
 def noted(lake: Path) -> list[dict[str, Any]]:
     """The lines of all runs."""
-    return [json.loads(line) for file in sorted((lake / "runs").iterdir()) for line in file.open(encoding="utf-8")]
+    texts = (file.read_text(encoding="utf-8") for file in sorted((lake / "runs").iterdir()))
+    return [json.loads(line) for text in texts for line in text.splitlines()]

@@ -85,14 +85,16 @@ class Judged:
             self.known[named, dbc] = task.prepare(self.lake, document), load(document).rig.parts
         return self.known[named, dbc]
 
+    def parts(self, found: Found) -> Sequence[Part]:
+        """The files of a recording, as its rig has them."""
+        return self.of(found.rig, found.dbc, found.place or found.uri)[1]
+
 
 def _run(plan: Plan, show: progress.Show, say: progress.Show) -> int:
     task.require_reports(plan.reports)
     lake = _lake(plan)
     judged = Judged(plan, lake)
-    everything = list(find(plan.sources, lambda rig: judged.of(rig)[1], without=lake.root))
-    for place in {(one.rig, one.dbc): one.place for one in everything}.items():
-        judged.of(*place[0], place=place[1] or plan.sources[0])
+    everything = list(find(plan.sources, judged.parts, without=lake.root))
     found = _of_shard(everything, plan.shard)
     lost = _unmatched(plan, everything)
     done = running.run(_requests(plan, judged, found), plan.scheduler, plan.workers, plan.limits, plan.function)

@@ -6,6 +6,7 @@ So that this process holds no results, and nothing that was finished is lost wit
 from __future__ import annotations
 
 import logging
+import signal
 import socket
 import time
 import uuid
@@ -52,10 +53,10 @@ def run(
     """
     with _client(scheduler, workers, limits) as client:
         suspects: list[Request] = []
-        yield from _windowed(client, iter(requests), limits, function, suspects)
+        yield from _windowed(client, scheduler, iter(requests), limits, function, suspects)
         for request in suspects:  # one at a time: who dies now dies by its own recording
             again: list[Request] = []
-            yield from _windowed(client, iter([request]), limits, function, again)
+            yield from _windowed(client, scheduler, iter([request]), limits, function, again)
             for one in again:
                 reason = f"every worker that audited it died ({limits.retries + 1} of them, then as many again)"
                 yield {**give_up(one, reason), "attempts": 2 * (limits.retries + 1)}
@@ -69,7 +70,12 @@ def perform(request: Request, limits: Limits, function: str) -> Summary:
 
 
 def _windowed(
-    client: Client, requests: Iterator[Request], limits: Limits, function: str, suspects: list[Request]
+    client: Client,
+    scheduler: str,
+    requests: Iterator[Request],
+    limits: Limits,
+    function: str,
+    suspects: list[Request],
 ) -> Iterator[Summary]:
     """The summaries; requests whose workers died are put to the `suspects`."""
     from distributed import KilledWorker, as_completed
@@ -82,8 +88,15 @@ def _windowed(
     del futures
     for future in done:
         request = pending.pop(future.key)
-        if future.status in ("cancelled", "lost") or client.status != "running":
-            raise _lost(client)
+        if future.status == "cancelled" or client.status != "running":
+            raise _lost(scheduler)
+        if future.status not in (
+            "finished",
+            "error",
+        ):  # its worker died before the summary was here: Dask does it again
+            pending[future.key] = request
+            done.add(future)
+            continue
         error = future.exception() if future.status == "error" else None
         if isinstance(error, KilledWorker):
             suspects.append(request)
@@ -133,8 +146,9 @@ def _client(scheduler: str, workers: int | None, limits: Limits) -> Iterator[Cli
                     threads_per_worker=1,
                     processes=True,
                     memory_limit=0,  # audits are in processes of their own: see guard.py
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",
                     silence_logs=logging.CRITICAL,
+                    preload=[__name__],  # dask_setup
                 )
             )
             yield stack.enter_context(Client(cluster))
@@ -156,9 +170,15 @@ def _connected(scheduler: str, connect: Any) -> Client:
     return client
 
 
-def _lost(client: Client) -> SchedulerLost:
+def dask_setup(worker: object) -> None:  # noqa: ARG001
+    """On a local worker, when it starts: Ctrl-C is for the command, which ends its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _lost(scheduler: str) -> SchedulerLost:
     return SchedulerLost(
         "the scheduler went away",
-        file=getattr(client, "_start_arg", None) and str(client._start_arg),
+        place="--scheduler",
+        found=scheduler,
         advice="what was finished is in the lake: run the command again with --resume",
     )

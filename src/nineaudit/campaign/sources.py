@@ -40,10 +40,10 @@ class Found:
     place: str = ""
 
 
-def find(sources: Sequence[str], parts: Callable[[str | None], Sequence[Part]], without: str = "") -> Iterator[Found]:
+def find(sources: Sequence[str], parts: Callable[[Found], Sequence[Part]], without: str = "") -> Iterator[Found]:
     """The recordings of the sources, in their order, each once.
 
-    `parts` gives the parts of a rig (None: the campaign's). `without`: a lake, whose files are none.
+    `parts` gives the parts of the rig of a recording. `without`: a lake, whose files are none.
     ConfigurationError: a source that is not there or holds no recording, one named twice, a table that is wrong.
     """
     seen: dict[str, str] = {}
@@ -77,11 +77,11 @@ def _of(source: str, without: str) -> Iterator[Found]:
     return _in_files(_below(source), without) if _is_folder(source) else iter([Found(source)])
 
 
-def _as_one(found: Iterable[Found], parts: Callable[[str | None], Sequence[Part]]) -> Iterator[Found]:
+def _as_one(found: Iterable[Found], parts: Callable[[Found], Sequence[Part]]) -> Iterator[Found]:
     """One for each recording of several files; a file that is named twice by itself stays."""
     firsts: set[str] = set()
     for one in found:
-        own = parts(one.rig)
+        own = parts(one)
         first = recording_files(one.uri, own)[0] if own else one.uri
         several = own and len(recording_files(one.uri, own)) > 1
         if several and first in firsts:

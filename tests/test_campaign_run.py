@@ -1,0 +1,218 @@
+"""Campaigns on Dask: what does harm costs only itself, nothing that was finished is lost, a lake comes out the same."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from campaigns import campaign, contents, entries, noted, plan, told
+from nineaudit.campaign.guard import Limits
+from nineaudit.campaign.running import SchedulerLost
+from nineaudit.errors import ConfigurationError
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder; processes find the functions of the tests."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(HERE))
+    return tmp_path
+
+
+@pytest.fixture
+def scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A scheduler with two workers, each a process of its own: (scheduler file, process of the scheduler)."""
+    file = folder / "scheduler.json"
+    dask = [sys.executable, "-m", "distributed.cli.dask_"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+    made = [
+        subprocess.Popen(
+            [*dask[:2], "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", file],
+            **quiet,
+        )
+    ]
+    worker = [*dask[:2], "distributed.cli.dask_worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"]
+    made += [subprocess.Popen([*worker, "--death-timeout", "60"], **quiet) for _ in range(2)]
+    until(file.is_file)
+    yield str(file), made[0]
+    for process in reversed(made):
+        process.kill()
+        process.wait()
+
+
+def until(true: object, seconds: float = 120.0) -> None:
+    """Wait until something is so."""
+    end = time.monotonic() + seconds
+    while not true():  # type: ignore[operator]
+        assert time.monotonic() < end, "it took too long"
+        time.sleep(0.05)
+
+
+def test_a_campaign_is_audited_once_and_counted() -> None:
+    campaign(Path())
+    code, shown, said = told(plan(Path()))
+    verdicts = [entry["result"]["verdict"] for entry in entries(Path("lake")).values()]
+    assert len(verdicts) == 4
+    assert code == (1 if "fail" in verdicts else 0)
+    assert shown[0].startswith("lake: 4 recordings: ")
+    assert said == []
+    lines = noted(Path("lake"))
+    assert {(line["attempts"], line["kept"]) for line in lines} == {(1, False)}
+    assert all(line["seconds"] > 0 and line["host"] for line in lines)
+    before = contents(Path("lake"), "results")
+    code, shown, _ = told(plan(Path(), resume=True))
+    assert shown[0].endswith("; 4 of them were audited before")
+    assert contents(Path("lake"), "results") == before
+
+
+@pytest.mark.slow
+def test_harm_costs_only_itself() -> None:
+    names = [f"{what}{i}.csv" for i, what in enumerate(("T", "T", "kills", "T", "neverends", "T", "crashes", "eats"))]
+    campaign(Path(), names)
+    limits = Limits(timeout=20.0, memory=500 * 2**20, retries=1)
+    code, shown, said = told(plan(Path(), limits=limits, function="campaign_functions:harmful"))
+    found = entries(Path("lake"))
+    assert set(found) == set(names)
+    lost = {name.rstrip("0123456789.csv"): entry for name, entry in found.items() if "transient" in entry}
+    assert set(lost) == {"kills", "neverends", "crashes", "eats"}
+    assert all(entry["result"]["verdict"] != "not_audited" for name, entry in found.items() if name[0] == "T")
+    for what, reason in (
+        ("kills", "every worker that audited it died"),
+        ("neverends", "longer than 20 s"),
+        ("crashes", "SIGSEGV"),
+        ("eats", "more than 500 MiB"),
+    ):
+        assert reason in lost[what]["reason"]
+        assert any(reason in line for line in said)
+    assert code == 3
+    assert "4 not audited" in shown[0]
+    code, shown, _ = told(plan(Path(), resume=True))
+    assert "transient" not in str(entries(Path("lake")).values())
+    assert shown[0].endswith("; 4 of them were audited before")
+    assert len(contents(Path("lake"))) == len(names)
+
+
+@pytest.mark.slow
+def test_a_killed_scheduler_loses_nothing_and_the_lake_comes_out_the_same(
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+) -> None:
+    names = [f"T{i}.csv" for i in range(10)]
+    campaign(Path(), names)
+    whole = plan(Path(), lake="undisturbed")
+    told(whole)
+    command = [sys.executable, "-c", _PROGRAM, scheduler[0]]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
+        until(lambda: len(contents(Path("lake"))) >= 3)
+        scheduler[1].kill()
+        _, said = run.communicate(timeout=120)
+    assert run.returncode == 3
+    assert "the scheduler went away" in said
+    assert "--resume" in said
+    done = contents(Path("lake"))
+    assert 3 <= len(done) < len(names)
+    told(plan(Path(), resume=True))
+    assert contents(Path("lake")) == contents(Path("undisturbed"))
+    assert contents(Path("lake"), "editions") == contents(Path("undisturbed"), "editions")
+    assert done.items() <= contents(Path("lake")).items()
+
+
+_PROGRAM = """
+import sys
+from nineaudit import cli
+from nineaudit.campaign import run_command, running
+from nineaudit.campaign.campaigning import Plan
+
+if __name__ == "__main__":
+    Plan.function = "campaign_functions:slow"
+    original = Plan.__init__
+    Plan.__init__ = lambda self, **options: original(self, **{**options, "function": "campaign_functions:slow"})
+    cli.main(["campaign", "run", "./tests", "--rig", "./rig.toml", "--lake", "lake", "--scheduler", sys.argv[1]])
+"""
+"""The command, with an audit that takes half a second more."""
+
+
+@pytest.mark.slow
+def test_ctrl_c_stops_at_once_and_loses_nothing() -> None:
+    campaign(Path(), [f"T{i}.csv" for i in range(10)])
+    with subprocess.Popen(
+        [sys.executable, "-c", _PROGRAM, "local"], stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as run:
+        until(lambda: len(contents(Path("lake"))) >= 2)
+        os.killpg(run.pid, signal.SIGINT)
+        _, said = run.communicate(timeout=60)
+    assert run.returncode == 130
+    assert "Traceback" not in said
+    assert "of 10 recordings: run it again with --resume" in said
+    done = contents(Path("lake"))
+    assert 2 <= len(done) < 10
+    _, shown, _ = told(plan(Path(), "./tests", resume=True))
+    assert done.items() <= contents(Path("lake")).items()
+    assert len(contents(Path("lake"))) == 10
+    assert "audited before" in shown[0]
+
+
+@pytest.mark.slow
+def test_parts_of_a_campaign_are_the_whole() -> None:
+    campaign(Path(), [f"T{i}.csv" for i in range(8)])
+    told(plan(Path(), lake="whole"))
+    sizes = []
+    for i in (1, 2, 3):
+        told(plan(Path(), lake="parts", shard=f"{i}/3"))
+        sizes.append(len(contents(Path("parts"))))
+    assert contents(Path("parts")) == contents(Path("whole"))
+    assert sizes == sorted(sizes)
+    assert sizes[0] < 8
+
+
+def test_a_changed_rig_costs_its_own_recordings() -> None:
+    campaign(Path(), ["T1.csv", "T2.csv", "T3.csv"])
+    rig = Path("rig.toml").read_text(encoding="utf-8")
+    for name in ("a.toml", "b.toml"):
+        Path(name).write_text(rig, encoding="utf-8")
+    Path("t.csv").write_text(
+        "recording,rig,number\ntests/T1.csv,a.toml,1\ntests/T2.csv,b.toml,2\ntests/T3.csv,,3\n", encoding="utf-8"
+    )
+    table = plan(Path(), "t.csv")
+    told(table)
+    Path("b.toml").write_text(rig.replace('name = "test"', 'name = "other"'), encoding="utf-8")
+    told(table)
+    last = sorted(Path("lake/runs").iterdir(), key=lambda p: p.stat().st_mtime_ns)[-1].read_text(encoding="utf-8")
+    again = [line for line in last.splitlines() if '"kept": false' in line]
+    assert len(again) == 1
+    assert "T2.csv" in again[0]
+    assert {name: entry["test"] for name, entry in entries(Path("lake")).items()} == {
+        f"T{n}.csv": {"number": str(n)} for n in (1, 2, 3)
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"shard": "3/2"}, "--shard: no such part; found '3/2'"),
+        ({"scheduler": "nowhere.json"}, "--scheduler: no such scheduler; found 'nowhere.json'"),
+        ({"rig": "none.toml"}, "none.toml: cannot read the rig file"),
+        ({"rig": None}, "tests/T1.csv: no rig file; name one with --rig, or in the table"),
+        ({"lake": "memory://lake"}, "--lake: only this process would see it"),
+        ({"lake": "rig.toml"}, "rig.toml"),
+    ],
+)
+def test_a_plan_that_is_wrong_is_a_sentence(change: dict[str, str], said: str) -> None:
+    campaign(Path(), ["T1.csv"])
+    with pytest.raises(ConfigurationError) as error:
+        told(replace(plan(Path()), **change))  # type: ignore[arg-type]
+    assert str(error.value).removeprefix(f"{Path.cwd()}/").startswith(said)
+
+
+def test_a_lost_scheduler_is_not_a_pass() -> None:
+    assert SchedulerLost.exit_code == 3
