@@ -116,8 +116,9 @@ def rig_of(rig: int, sensors: tuple[int, ...]) -> Any:
     return replace(made, name=f"head {rig}")
 
 
-def simulated(number: int, tests: int, seed: int, drift: float, swaps: int) -> Any:
-    """The recording of a test: a perfect instrument's, and what the errors of this one add to it."""
+def simulated(number: int, tests: int, seed: int, drift: float, swaps: int, again: int = 0) -> Any:
+    """The recording of a test: a perfect instrument's, and what the errors of this one add to it. `again`: another test
+    with the same sensors in the same seats."""
     import numpy as np
 
     from nineaudit.array import frozen
@@ -127,8 +128,8 @@ def simulated(number: int, tests: int, seed: int, drift: float, swaps: int) -> A
     which = number % RIGS
     sensors = seated(which, number, tests, swaps)
     rig, motion = rig_of(which, tuple(sensors)), MOTIONS[(number // RIGS) % len(MOTIONS)]
-    clean = simulate(rig, motion, seed=1_000_000 * seed + number, rate_hz=10_000.0, imperfect=False)
-    real = true_instrument(rig.array, sensors, which, number, seed)
+    clean = simulate(rig, motion, seed=1_000_000 * seed + number + 500_000 * again, rate_hz=10_000.0, imperfect=False)
+    real = true_instrument(rig.array, sensors, which, number + 500_000 * again, seed)
     late = drift * (np.array([f"S{s:03d}" == planted(seed) for s in sensors]) & (number >= tests // 2))
     real = replace(real, gain=real.gain + late)
     ideal = instrument.sense(instrument.perfect(rig.array), clean.truth)

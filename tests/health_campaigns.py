@@ -7,6 +7,7 @@ channels by a likelihood in which a scale that all gains share is not seen.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import date
 
 import numpy as np
 
@@ -84,7 +85,15 @@ def _test(
     noise = vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(rows)))
     label = f"2026-{1 + number // 28:02d}-{1 + number % 28:02d}"
     shock = {row.sensor: float(rng.uniform(500.0, 2000.0)) for row in rows}
-    return Record(f"T{number:04d}", label, float(number), rows, matrix @ theta + noise, matrix, shock)
+    return Record(
+        f"T{number:04d}",
+        label,
+        float(date.fromisoformat(label).toordinal()),
+        rows,
+        matrix @ theta + noise,
+        matrix,
+        shock,
+    )
 
 
 def _rows(plan: Plan, rig: int, channel: int, number: int) -> list[Row]:
