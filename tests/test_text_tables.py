@@ -88,7 +88,7 @@ def test_a_byte_that_is_no_text_costs_its_cell_alone(tmp_path: Path) -> None:
     text = ("t_s,p,q\n" + rows()).encode().replace(b"3.5", b"3\xe45")
     found = contents(tmp_path, text)
     same(found, np.where(P == 3.5, np.nan, P))
-    assert "column 'p': 1 cells hold no number, first in line 5: '3ä5'" in found.notes
+    assert "column 'p': 1 cell without a number, first in line 5: '3ä5'" in found.notes
 
 
 # --- rows ---------------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def test_blocks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blo
     kept = np.delete(np.arange(300), 269)
     values = np.where(kept == 249, np.nan, kept + 0.5)
     np.testing.assert_array_equal(found.traces[0].values, values)
-    assert "column 'p': 1 cells hold no number, first in line 251: 'OVERFLOW'" in found.notes
+    assert "column 'p': 1 cell without a number, first in line 251: 'OVERFLOW'" in found.notes
     assert [d.place for d in found.damage] == ["line 271"]
 
 
@@ -147,7 +147,7 @@ def test_blocks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, blo
 def test_cells_without_a_number_are_counted_and_named(tmp_path: Path, word: str) -> None:
     found = contents(tmp_path, "t_s,p,q\n" + rows().replace(",3.5,", f",{word},"))
     same(found, np.where(P == 3.5, np.nan, P))
-    assert f"column 'p': 1 cells hold no number, first in line 5: {word!r}" in found.notes
+    assert f"column 'p': 1 cell without a number, first in line 5: {word!r}" in found.notes
     assert found.counts["invalid_cells"] == 1
     assert found.damage == ()
 
@@ -398,3 +398,33 @@ def test_what_was_found_is_told_in_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(RecordingError) as caught:
         contents(tmp_path, b"\0" * 5000 + b"time,p,q\n" + rows().encode())
     assert len(str(caught.value)) < 1000
+
+
+# --- as loggers export --------------------------------------------------------------------------------------------
+
+
+def test_a_preamble_of_23_lines_with_labels_that_are_not_known(tmp_path: Path) -> None:
+    """Public code that reads SLICEWare exports skips 23 lines, the labels of all in the first column, and knows
+    `Channel Description` among them; the other labels here are made up."""
+    above = "".join(f"Test {word},x\n" for word in ("Date", "Time", "ID", "Operator", "Room"))
+    label = "".join(f"Gauge {i} of {i},{i},{i + 1}\n" for i in range(15))
+    names = "Data Channel Number,1,2\nChannel Description,p,q\n"
+    found = contents(tmp_path, above + names + label + "EU,g,g\n" + rows())
+    same(found)
+    assert found.damage == ()
+    assert [t.unit for t in found.traces] == ["g", "g"]
+    assert any("taken as a description" in note for note in found.notes)
+
+
+def test_a_first_row_without_a_time_is_no_description(tmp_path: Path) -> None:
+    found = contents(tmp_path, "time,p,q\nnull,1,2\n" + rows())
+    assert [d.what for d in found.damage] == ["readings in a row without a time stamp"]
+
+
+def test_a_line_of_names_with_a_label_and_a_remark_at_the_end(tmp_path: Path) -> None:
+    """The layout of the manual of Gulf Coast Data Concepts' loggers (X16-1D, section 3.2)."""
+    text = ";Title, x16-1d, ADXL345\n;SampleRate, 100,Hz\n;Headers, time,p,q\n" + rows() + ";shutdown: switched off\n"
+    found = contents(tmp_path, text)
+    same(found)
+    assert found.damage == ()
+    assert "1 line of comment among the rows" in found.notes

@@ -17,6 +17,7 @@ from nineaudit.readers.tables.text_blocks import Encoding
 SEPARATORS: Final = (",", ";", "\t", "|")
 _HEAD: Final = 2**20
 _DEEPEST: Final = 200
+_LABELLED: Final = 5
 """Bytes of a file that are its head, and lines of it among which a header row is sought."""
 _DECIMALS: Final = {mark: re.compile(rf"[-+]?\d*{mark}\d+(?:[eE][-+]?\d+)?") for mark in (r"\.", ",")}
 THOUSANDS: Final = re.compile(r"[-+]?\d{1,3}(?:([,.'\u00a0\u202f ’])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
@@ -91,7 +92,7 @@ def detect(
     lines = tuple(line.decode(encoding.inside, "replace").rstrip("\r") for line in raw)
     separator = separator or _stated_separator(lines)
     header, separator = _header(lines, wanted, separator, path)
-    names = cells_of(lines[header], separator)
+    names = _without_label(cells_of(lines[header], separator), lines[header + 1 :], separator)
     trailing = len(names) > 1 and not names[-1]
     below = [line for line in lines[header + 1 : -1 if len(head) > _HEAD else None] if line.strip()]
     if all(is_number(name) for name in names):
@@ -108,6 +109,13 @@ def detect(
         codec=encoding.inside,
         trailing=trailing,
     )
+
+
+def _without_label(names: list[str], below: Sequence[str], separator: str) -> list[str]:
+    """The names without the label of their line, which rows do not have (Gulf Coast Data Concepts: `;Headers, t,x`)."""
+    rows = [cells_of(line, separator) for line in below[:_LABELLED] if line.strip()]
+    alike = bool(rows) and all(len(cells) == len(names) - 1 for cells in rows[:-1] or rows)
+    return names[1:] if alike and re.fullmatch(r"[;#]?\s*headers?", names[0], re.IGNORECASE) else names
 
 
 def base(name: str) -> str:

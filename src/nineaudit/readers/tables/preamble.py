@@ -41,6 +41,8 @@ _RATE: Final = re.compile(
 _STEP: Final = re.compile(
     r"(sampl(e|ing)[ _-]?(interval|period|time)|abtastintervall|delta[ _]?[xt]|dt)", re.IGNORECASE
 )
+_WORD: Final = re.compile(r"[^\W\d_][^\W\d_/-][\w ./()%:#-]+")
+_NO_VALUE: Final = re.compile(r"null|none|n/?a\b|missing|invalid|over|error", re.IGNORECASE)
 _VALUE: Final = re.compile(r"\s*([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)\s*([a-zA-Zµ]*)")
 _SCALE: Final = {
     "hz": 1.0, "khz": 1e3, "mhz": 1e6, "sps": 1.0, "ksps": 1e3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3,
@@ -88,12 +90,14 @@ def surroundings(table: Dialect, time: int | None, channels: Sequence[int], rig:
         if _UNIT_LABEL.fullmatch(label) or _are_units(cells, wanted, rig):
             units |= _stated(cells, wanted)
         elif not (_LABEL.match(label) or TIME_NAME.fullmatch(label)):
-            if _has_numbers(cells, wanted):
+            if _has_numbers(cells, wanted) and not (
+                time == 0 and _WORD.fullmatch(label) and not _NO_VALUE.match(label)
+            ):
                 break
             notes.append(f"line {index + 1} below the header holds no readings: taken as a description")
         first = index + 1
     else:
-        first = table.header + 1 if notes else first
+        first = table.header + 1 if notes and not _numbers_begin(table, first) else first
     if not units:
         units = _units_above(table, wanted, rig)
     hertz, place = _rate(table, first)
@@ -116,6 +120,12 @@ def _rows_below(table: Dialect) -> Iterator[tuple[str, list[str], int]]:
         if is_number(cells[0]):
             return
         yield cells[0], cells, index
+
+
+def _numbers_begin(table: Dialect, index: int) -> bool:
+    """Whether the next line that is not blank begins with a number."""
+    following = next((line for line in table.lines[index:] if line.strip()), "")
+    return is_number(table.cells(following)[0])
 
 
 def _numeric_first(table: Dialect) -> bool:
@@ -144,8 +154,8 @@ def _units_above(table: Dialect, wanted: Sequence[int], rig: Rig) -> dict[int, s
 
 
 def _stated(cells: Sequence[str], wanted: Sequence[int]) -> dict[int, str]:
-    """Units by column, without their brackets; a dash, a number and nothing are none."""
-    bare = {i: _bare(cells[i]) for i in wanted if i < len(cells)}
+    """Units by column, without their brackets; a dash, a number, nothing and the label of the row are none."""
+    bare = {i: _bare(cells[i]) for i in wanted if i < len(cells) and not (i == 0 and _UNIT_LABEL.fullmatch(cells[0]))}
     return {i: unit for i, unit in bare.items() if unit.strip("-") and not is_number(unit)}
 
 

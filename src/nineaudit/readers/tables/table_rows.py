@@ -20,6 +20,7 @@ from nineaudit.errors import RecordingError
 from nineaudit.readers.tables.dialect import THOUSANDS, Dialect, number
 from nineaudit.readers.tables.equal_rows import parsed, structure
 from nineaudit.recording import Damage
+from nineaudit.units import counted
 
 _TRAILING: Final = "rows end with a separator that the header does not have: it is left out"
 
@@ -81,11 +82,12 @@ class Rows:
     def notes(self) -> Iterator[str]:
         """What holds no number, by column, and what else was seen."""
         for column, count in self.bad.items():
-            yield f"column {self.table.names[column]!r}: {count} cells hold no number, {self.first_bad[column]}"
+            bad = f"{counted(count, 'cell')} without a number, {self.first_bad[column]}"
+            yield f"column {self.table.names[column]!r}: {bad}"
         if self.trailing:
             yield _TRAILING
         if self.comments:
-            yield f"{self.comments} lines of comment among the rows"
+            yield f"{counted(self.comments, 'line')} of comment among the rows"
 
     def damage(self) -> Iterator[Damage]:
         """Rows that could not be read, one Damage a kind, and a last line without its end."""
@@ -149,7 +151,7 @@ class Rows:
         for place, line in enumerate(block[:-1].split(b"\n"), self.line):
             if not line.strip():
                 continue
-            if line.lstrip().startswith(b"#"):
+            if line.lstrip().startswith((b"#", b"#" if self.table.separator == ";" else b";")):
                 self.comments += 1
                 continue
             for column, numbers in zip(values, self._row(line, place), strict=False):
@@ -166,7 +168,12 @@ class Rows:
             self.trailing = self.trailing or (surplus == 1 and not self.table.trailing)
             return [self._reading(cells[column], column, number) for column in self.wanted]
         else:
-            self._leave(number, "a row of the wrong length", f"{len(cells)} cells for {len(self.table.names)} columns")
+            self._leave(
+                number,
+                "a row of the wrong length",
+                held = f"{counted(len(cells), 'cell')} for {counted(len(self.table.names), 'column')}"
+                held,
+            )
         return [nan] * len(self.wanted) if self.keep else ()
 
     def _cells(self, line: bytes) -> list[str]:
