@@ -77,6 +77,22 @@ def test_any_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, style: Styl
     equal(log, forced(path, monkeypatch))
 
 
+@pytest.mark.parametrize("compression", range(7))
+def test_every_compression_that_asammdf_writes(tmp_path: Path, compression: int) -> None:
+    """Deflate, zstd and LZ4, as is and transposed; MDF 4.30 has the last four."""
+    from asammdf import MDF
+
+    rows = random_rows(np.random.default_rng(4), 500, 64)
+    path = write_mf4(tmp_path / "plain.mf4", [(DATA, rows, Style(width=64))])
+    with MDF(path, process_bus_logging=False) as plain, MDF(version="4.30") as out:
+        out.append(plain.get("CAN_DataFrame", group=0, raw=True))
+        out.save(tmp_path / "t.mf4", overwrite=True, compression=compression)
+    log = read_mdf(tmp_path / "t.mf4")
+    check(log, rows)
+    assert log.damage == ()
+    assert (b"##DZ" in (tmp_path / "t.mf4").read_bytes()) == (compression > 0)
+
+
 def test_windows_smaller_than_the_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nineaudit.readers.can.mdf_blocks._WINDOW", 100)
     monkeypatch.setattr("nineaudit.readers.can.mdf_records._ROWS", 7)

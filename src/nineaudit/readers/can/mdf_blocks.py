@@ -16,7 +16,7 @@ from nineaudit.readers.can.losses import Losses
 from nineaudit.readers.inflate import inflate
 
 Bytes = NDArray[np.uint8]
-_WINDOW: Final = 1 << 18
+_WINDOW: Final = 1 << 20
 """Bytes at a time of a block that is not compressed: they stay in the cache."""
 _COMPRESSION: Final = {1: "deflate", 2: "deflate", 3: "lz4", 4: "lz4", 5: "zstd", 6: "zstd"}
 """By asammdf's number of the kind of block (`v4_constants`): even ones are transposed, 0 is not compressed."""

@@ -22,7 +22,7 @@ TOO_LONG: Final = "a length beyond the bytes that are there"
 MARKED: Final = "a frame that the file itself marks as not valid"
 NOT_STORED: Final = "data of a frame that are not where its record says"
 FEWER: Final = "fewer records than the channel group states"
-_ROWS: Final = 1 << 14
+_ROWS: Final = 1 << 15
 _LATEST: Final = float(2**63)
 _OF_CODE: Final = np.array([*range(9), 12, 16, 20, 24, 32, 48, 64], dtype=np.int64)
 
@@ -139,8 +139,9 @@ def _times(out: NDArray[np.int64], clock: NDArray[Any], conversion: Any) -> Bool
 def nanoseconds(seconds: NDArray[np.float64], out: NDArray[np.int64]) -> BoolArray | None:
     """Seconds to whole nanoseconds in `out`; (n,) those that are no number or beyond int64, which become 0; or None."""
     with np.errstate(invalid="ignore", over="ignore"):
-        whole = np.rint(seconds * 1e9)
-        if not len(whole) or np.abs(whole).max() < _LATEST:
+        whole = seconds * 1e9
+        np.rint(whole, out=whole)
+        if not len(whole) or (whole.max() < _LATEST and whole.min() > -_LATEST):
             out[:] = whole
             return None
         bad = ~(np.abs(whole) < _LATEST)
@@ -171,8 +172,8 @@ def flags(kind: int, numbers: Any, count: int) -> NDArray[np.uint8]:
     """(count,) `kind` of frames with their flags."""
     out = np.full(count, kind, dtype=np.uint8)
     for name, bit in (*FLAGS, ("Dir", SENT)):
-        if name in numbers:
-            out |= (numbers[name] != 0).view(np.uint8) * np.uint8(bit)
+        if name in numbers and (found := numbers[name] != 0).any():
+            out |= found.view(np.uint8) * np.uint8(bit)
     return out
 
 

@@ -33,8 +33,9 @@ def _of_two(one: Frames, two: Frames) -> Frames:
     at = side + np.arange(len(few))
     rest = np.ones(len(one) + len(two), dtype=np.bool_)
     rest[at] = False
-    columns: dict[str, Any] = {name: _put(getattr(most, name), getattr(few, name), at, rest) for name in _COLUMNS}
-    columns["data"] = _put(_words(most), _words(few), at, rest).view(np.uint8).reshape(-1, SHORT)
+    before = np.cumsum(rest) - 1  # row of the longer; at `at` any
+    columns: dict[str, Any] = {name: _put(getattr(most, name), getattr(few, name), at, before) for name in _COLUMNS}
+    columns["data"] = _put(_words(most), _words(few), at, before).view(np.uint8).reshape(-1, SHORT)
     return replace(one, **columns, **_long(most, few, at, rest))
 
 
@@ -46,9 +47,8 @@ def _words(part: Frames) -> NDArray[np.uint64]:
     return np.ascontiguousarray(part.data).view(np.uint64).reshape(-1)
 
 
-def _put(most: NDArray[Any], few: NDArray[Any], at: Rows, rest: BoolArray) -> NDArray[Any]:
-    out = np.empty(len(rest), dtype=most.dtype)
-    out[rest] = most
+def _put(most: NDArray[Any], few: NDArray[Any], at: Rows, before: Rows) -> NDArray[Any]:
+    out = most.take(before)
     out[at] = few
     return out
 
