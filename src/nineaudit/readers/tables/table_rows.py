@@ -168,12 +168,8 @@ class Rows:
             self.trailing = self.trailing or (surplus == 1 and not self.table.trailing)
             return [self._reading(cells[column], column, number) for column in self.wanted]
         else:
-            self._leave(
-                number,
-                "a row of the wrong length",
-                held = f"{counted(len(cells), 'cell')} for {counted(len(self.table.names), 'column')}"
-                held,
-            )
+            held = f"{counted(len(cells), 'cell')} for {counted(len(self.table.names), 'column')}"
+            self._leave(number, "a row of the wrong length", held)
         return [nan] * len(self.wanted) if self.keep else ()
 
     def _cells(self, line: bytes) -> list[str]:
