@@ -5,7 +5,7 @@
 
 Each format can be run by itself: readers_blf.py, readers_text.py, readers_mdf.py, readers_mcap.py, readers_csv.py.
 Where the library would need many minutes its time a frame is that of the first frames, which its script's output says.
-The exit code is 1 where a figure is short of what is asked, or a script gave none.
+The exit code is 1 where a figure is short of what is asked, or a script did not give all of its own.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ from figures import Figure, figure, table
 
 HERE = Path(__file__).parent
 SIZES = {
-    "readers_blf.py": ("--count", 5_000_000),
-    "readers_text.py": ("--count", 5_000_000),
-    "readers_mdf.py": ("--count", 5_000_000),
-    "readers_mcap.py": ("--count", 600_000),
-    "readers_csv.py": ("--megabytes", 1000),
+    "readers_blf.py": ("--count", 5_000_000, 6),
+    "readers_text.py": ("--count", 5_000_000, 4),
+    "readers_mdf.py": ("--count", 5_000_000, 2),
+    "readers_mcap.py": ("--count", 600_000, 3),
+    "readers_csv.py": ("--megabytes", 1000, 1),
 }
+"""Of each script the option of its size, the size, and how many figures it gives."""
 MDF = {
     r"ratio ([\d.]+)": ("MF4: asammdf extract_bus_logging / read and decoded", ">=", 2.5),
     r"peak memory ([\d.]+) bytes a frame": ("MF4: peak memory, bytes a frame", "<=", 160),
@@ -47,9 +48,6 @@ def run(script: str, option: str, size: int) -> list[Figure]:
             found += [one] if one else []
             if script == "readers_mdf.py":
                 found += of_mdf(line)
-    if process.returncode not in (0, 1):  # 1: a figure is short
-        print(f"{script} ended with exit code {process.returncode}", flush=True)
-        return []
     return found
 
 
@@ -65,12 +63,12 @@ def main() -> int:
     parser.add_argument("--part", type=float, default=1.0, help="of the sizes")
     part = parser.parse_args().part
     start, figures, silent = time.perf_counter(), list[Figure](), []
-    for script, (option, size) in SIZES.items():
+    for script, (option, size, count) in SIZES.items():
         began = time.perf_counter()
         print(f"== {script}", flush=True)
         found = run(script, option, max(int(part * size), 1))
         figures += found
-        silent += [] if found else [script]
+        silent += [] if len(found) == count else [script]
         print(f"   {time.perf_counter() - began:.0f} s", flush=True)
     minutes = (time.perf_counter() - start) / 60
     largest = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
@@ -80,7 +78,7 @@ def main() -> int:
     ]
     print("== all figures: measured, asked")
     print(table(figures))
-    print("".join(f"{script}: SHORT, it gave no figure\n" for script in silent), end="")
+    print("".join(f"{script}: SHORT, it did not give all its figures\n" for script in silent), end="")
     return int(bool(silent) or not all(f.holds for f in figures))
 
 
