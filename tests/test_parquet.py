@@ -48,7 +48,7 @@ def test_a_flipped_byte_costs_its_group_of_rows_alone(tmp_path: Path) -> None:
     path.write_bytes(whole[:place] + np.float64(99.5).tobytes() + whole[place + 8 :])
     found = read_parquet(path, RIG)
     np.testing.assert_array_equal(found.traces[0].values, np.delete(P, np.arange(20, 30)))
-    assert [(d.place, d.count, d.lost) for d in found.damage] == [("row group 3", 1, "10 rows are left out")]
+    assert [(d.place, d.count, d.lost) for d in found.damage] == [("row group 3", 1, "10 rows left out")]
 
 
 def test_a_written_recording_carries_checksums(tmp_path: Path) -> None:

@@ -149,7 +149,7 @@ def test_cells_without_a_number_are_invalid_counted_and_named(tmp_path: Path) ->
     assert np.flatnonzero(~found.valid[:, 0]).tolist() == [3, 5, 7]
     assert np.flatnonzero(~found.valid[:, 1]).tolist() == [7]
     assert np.isnan(found.readings[~found.valid]).all()
-    assert "column 'p': 3 cells hold no number, first in line 5: 'n/a'" in found.source.notes
+    assert "column 'p': 3 cells without a number, first in line 5: 'n/a'" in found.source.notes
 
 
 def test_rows_without_a_time_are_left_out_and_counted(tmp_path: Path) -> None:

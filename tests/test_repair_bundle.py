@@ -15,7 +15,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from nineaudit import cli, repair, verify
+from nineaudit import cli, commands, repair, verify
 from nineaudit.auditing import Audit, audit
 from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.files import is_sealed
@@ -159,6 +159,32 @@ def test_an_mcap_log_keeps_every_byte(here: Audit) -> None:
     for channel in others:
         np.testing.assert_array_equal(after_.column(channel), before_.column(channel))
     assert (after_.column("a1y") != before_.column("a1y")).sum() == 570
+
+
+def test_what_of_a_damaged_log_is_not_carried_over_is_said(here: Audit) -> None:
+    encode(here.recording, Path("T.mcap"))
+    whole = Path("T.mcap").read_bytes()
+    Path("T.mcap").write_bytes(whole[: int(0.98 * len(whole))])
+    done = audit(read("T.mcap", here.recording.rig))
+    assert done.recording.source.damage
+    said = commands.repaired(done, Path("new.mcap"), channel="a1y")
+    document = json.loads(path_beside(Path("new.mcap")).read_text(encoding="utf-8"))
+    assert document["original"]["damage"] == [str(damage) for damage in done.recording.source.damage]
+    first, *rest = document["not_carried_over"]
+    assert "was written anew: topics that are not the rig's, attachments and metadata" in first
+    assert rest == [f"T.mcap: {damage}" for damage in done.recording.source.damage]
+    assert [line for line in said if "not carried over from T.mcap: " in line] == [
+        f"new.mcap: not carried over from {lost}" for lost in document["not_carried_over"]
+    ]
+
+
+def test_a_whole_recording_leaves_nothing_behind(here: Audit) -> None:
+    encode(here.recording, Path("T.mcap"))
+    done = audit(read("T.mcap", here.recording.rig))
+    assert not any("not carried over" in line for line in commands.repaired(done, Path("new.mcap")))
+    document = json.loads(path_beside(Path("new.mcap")).read_text(encoding="utf-8"))
+    assert document["not_carried_over"] == []
+    assert "damage" not in document["original"]
 
 
 def test_a_repair_of_a_repair_tells_both(here: Audit) -> None:

@@ -147,7 +147,7 @@ def test_bus_damage_waivers_and_origin_are_told(page: Page) -> None:
     for words in (
         "0x24 KINEMATICS 1 yes 2001",
         "A0X_CNT: 3 numbers missing; A0X_CNT: 1 numbers repeated; A0X_CRC: 2 checksums wrong; "
-        "A0X: 4 values outside -500 to 500 g; A0X: 5 times not available; 1 frames longer",
+        "A0X: 4 values outside -500 to 500 g; A0X: 5 times not available; 1 frame longer",
         "0x00000123 not in the database",
         "Never came: STATUS.",
         "T0001.blf byte 4711 an object that does not begin with LOBJ 3 about 12 frames",

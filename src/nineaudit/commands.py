@@ -52,6 +52,7 @@ def repaired(
     return [
         f"{output}: {' and '.join(done['channels'])} {_how(done)}, {done['samples_replaced']} of "
         f"{done['samples']} samples, standard uncertainty {u}",
+        *(f"{output}: not carried over from {lost}" for lost in done["not_carried_over"]),
         f"{made}: what was done, how well, from what, by whom",
     ]
 

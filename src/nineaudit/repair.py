@@ -24,8 +24,8 @@ from nineaudit.reconstruct import Reconstruction
 from nineaudit.recording import Recording
 from nineaudit.repair_record import provenance, readings_to_write
 from nineaudit.signals import in_unit
-from nineaudit.writers import Outcome, encode, place
-from nineaudit.writers.mcap_rebuilt import Column, NotWhole, add_rebuilt, log_time_of_zero
+from nineaudit.writers import Outcome, encode, mcap_summary, place
+from nineaudit.writers.mcap_rebuilt import Column, add_rebuilt, log_time_of_zero
 
 __all__ = ["provenance_path", "repair", "repaired_readings"]
 
@@ -58,7 +58,7 @@ def repair(
                 "the file exists", file=path, advice="choose another --output, or overwrite it with --force"
             )
     rebuilt = _reconstruction(audit, channel)
-    document = provenance(audit, rebuilt, reason, by, datetime.now(UTC) if now is None else now)
+    document = provenance(audit, rebuilt, output, reason, by, datetime.now(UTC) if now is None else now)
 
     def make(unnamed: Path) -> Outcome:
         outcome = _written(audit, rebuilt, unnamed, dbc, document)
@@ -115,11 +115,9 @@ def _written(
     if path.suffix.lower() != ".mcap":
         return encode(audit.recording, path, dbc, readings_to_write(audit, rebuilt))
     source = audit.recording.source
-    if source.format == "mcap" and not source.parts and source.path.exists():
-        try:
-            return _added(audit, rebuilt, source.path, path, document)
-        except NotWhole:
-            path.unlink(missing_ok=True)
+    whole = source.format == "mcap" and not source.parts and source.path.exists()
+    if whole and mcap_summary.read(source.path) is not None:
+        return _added(audit, rebuilt, source.path, path, document)
     as_measured = partial_name(path)
     try:
         encode(audit.recording, as_measured)

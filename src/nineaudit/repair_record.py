@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from nineaudit.files import sha256
 from nineaudit.provenance import SCHEMA
 from nineaudit.reconstruct import Reconstruction
 from nineaudit.recording import Source
+from nineaudit.writers import mcap_summary
 
 
 def readings_to_write(audit: Audit, rebuilt: Reconstruction) -> FloatArray:
@@ -25,13 +27,16 @@ def readings_to_write(audit: Audit, rebuilt: Reconstruction) -> FloatArray:
     return out
 
 
-def provenance(audit: Audit, rebuilt: Reconstruction, reason: str, by: str, now: datetime) -> dict[str, Any]:
-    """The record (nineaudit/provenance/1), but for the output (ISO/IEC 17025 7.5, 7.11); SI units."""
+def provenance(
+    audit: Audit, rebuilt: Reconstruction, output: Path, reason: str, by: str, now: datetime
+) -> dict[str, Any]:
+    """The record (nineaudit/provenance/1) but for the hash of `output` (ISO/IEC 17025 7.5, 7.11); SI units."""
     source, rig, diagnosis = audit.recording.source, audit.recording.rig, audit.diagnosis
     previous = source.provenance.document if source.provenance is not None else None
     return {
         "schema": SCHEMA,
         "original": _original(source) | ({"parts": [_original(part) for part in source.parts]} if source.parts else {}),
+        "not_carried_over": left_behind(source, output),
         "rig": {"name": rig.name, "sha256": rig.sha256},
         "rulebook": {"sha256": audit.rulebook.sha256, "rules": len(audit.rulebook.rules)},
         "databases": [{"path": path.name, "sha256": sha256(path)} for path in rig.dbc if path.is_file()],
@@ -60,7 +65,20 @@ def provenance(audit: Audit, rebuilt: Reconstruction, reason: str, by: str, now:
 
 
 def _original(source: Source) -> dict[str, Any]:
-    return {"path": source.path.name, "sha256": source.sha256, "bytes": source.size, "altered": False}
+    kept = {"path": source.path.name, "sha256": source.sha256, "bytes": source.size, "altered": False}
+    return kept | ({"damage": [str(damage) for damage in source.damage]} if source.damage else {})
+
+
+def left_behind(source: Source, output: Path) -> list[str]:
+    """What of the original could not be carried over into `output`: in an MCAP log that is continued every byte is;
+    else what could not be read is not, and of an MCAP log that had to be written anew, whatever is not the rig's."""
+    damage = [f"{file.path.name}: {damage}" for file in source.files for damage in file.damage]
+    if source.format != "mcap" or output.suffix.lower() != ".mcap" or source.parts:
+        return damage
+    if source.path.exists() and mcap_summary.read(source.path) is not None:
+        return []
+    anew = "the log cannot be continued and was written anew: topics that are not the rig's, attachments and metadata"
+    return [f"{source.path.name}: {anew}", *damage]
 
 
 def _stretches(audit: Audit, rebuilt: Reconstruction, k: int) -> list[list[float]]:

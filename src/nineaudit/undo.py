@@ -31,7 +31,7 @@ from nineaudit.estimate.posterior import posterior
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import Fit, fit
 from nineaudit.reconstruct import ZERO, Reconstruction, bound_ratio, event_data, from_donors, left_out, rms, statistic
-from nineaudit.units import display
+from nineaudit.units import counted, display
 
 Model = Callable[[Faulty], Undone]
 
@@ -195,4 +195,4 @@ def _in_words(
     else:
         size, error = (display(v["size"], "m", units, d) for v, d in ((values, 3), (u, 2)))
         text = f"{fault} undone: {size} (u {error}) from its place in the rig"
-    return f"{text}; {filled} samples filled from the others" if filled else text
+    return f"{text}; {counted(filled, 'sample')} filled from the others" if filled else text

@@ -64,7 +64,9 @@ def message_checksums(case: Case, *, max_frames: int) -> Answer:
         max_frames,
         "frames",
         "no signal is named a checksum, or none follows a known method",
-        lambda x: ", ".join(f"{c.signal} ({c.method}) is wrong {c.wrong} times" for c in x.checksums if c.method),
+        lambda x: ", ".join(
+            f"{c.signal} ({c.method}) is wrong {counted(c.wrong, 'time')}" for c in x.checksums if c.method
+        ),
     )
 
 
@@ -122,18 +124,25 @@ def standing_still(case: Case, *, max_messages: int) -> Answer:
     )
 
 
-def _concerned(case: Case, whose: Callable[[Identifier], bool], unless: str) -> Sequence[Identifier] | NotApplicable:
-    bus = case.recording.bus
-    if bus is None:
-        return NO_BUS
-    found = [x for x in bus.identifiers if whose(x)]
-    return found or NotApplicable(unless)
-
-
 def _named(x: Identifier, case: Case) -> str:
     """The message, with its bus where the log has several."""
     buses = {y.bus for y in case.recording.bus.identifiers} if case.recording.bus else set()
     return f"{x.label} on bus {x.bus}" if len(buses) > 1 else x.label
+
+
+def _held(
+    case: Case,
+    whose: Callable[[Identifier], bool],
+    unless: str,
+    size: Callable[[Identifier], float],
+    measured: Callable[[Sequence[Identifier], Identifier], Measure],
+) -> Answer:
+    """What is `measured` of the messages concerned and of the largest of them."""
+    bus = case.recording.bus
+    if bus is None:
+        return NO_BUS
+    found = [x for x in bus.identifiers if whose(x)]
+    return measured(found, max(found, key=size)) if found else NotApplicable(unless)
 
 
 def _worst(
@@ -145,13 +154,13 @@ def _worst(
     told: Callable[[Identifier], str],
 ) -> Answer:
     """The largest value of a message; how many others are beyond the limit is said."""
-    found = _concerned(case, whose, unless)
-    if isinstance(found, NotApplicable):
-        return found
-    worst = max(found, key=value)
-    beyond = sum(value(x) > limit for x in found)
-    others = f" ({beyond} of {len(found)} messages beyond)" if beyond > 1 else ""
-    return Measure(value(worst), limit, "1", detail=f"{_named(worst, case)}{others}: {told(worst)}")
+
+    def measured(found: Sequence[Identifier], worst: Identifier) -> Measure:
+        beyond = sum(value(x) > limit for x in found)
+        others = f" ({beyond} of {len(found)} messages beyond)" if beyond > 1 else ""
+        return Measure(value(worst), limit, "1", detail=f"{_named(worst, case)}{others}: {told(worst)}")
+
+    return _held(case, whose, unless, value, measured)
 
 
 def _total(
@@ -164,14 +173,14 @@ def _total(
     told: Callable[[Identifier], str],
 ) -> Answer:
     """Sum over the messages; the one with most is said."""
-    found = _concerned(case, whose, unless)
-    if isinstance(found, NotApplicable):
-        return found
-    worst, total = max(found, key=count), sum(map(count, found))
-    others = sum(count(x) > 0 for x in found) - 1
-    more = f", and {counted(others, 'more message')}" if others > 0 else ""
-    detail = f"{_named(worst, case)}: {told(worst)}{more}; in all" if total else f"{counted(len(found), 'message')},"
-    return Measure(float(total), float(limit), unit, detail=detail)
+
+    def measured(found: Sequence[Identifier], worst: Identifier) -> Measure:
+        total, others = sum(map(count, found)), sum(count(x) > 0 for x in found) - 1
+        more = f", and {counted(others, 'more message')}" if others > 0 else ""
+        said = f"{_named(worst, case)}: {told(worst)}{more}; in all" if total else f"{counted(len(found), 'message')},"
+        return Measure(float(total), float(limit), unit, detail=said)
+
+    return _held(case, whose, unless, count, measured)
 
 
 CHECKS: dict[str, Callable[..., Answer]] = {

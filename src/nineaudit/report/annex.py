@@ -10,6 +10,7 @@ from nineaudit.finding import COVERAGE_FACTOR, Finding, Verdict
 from nineaudit.report.findings import channels
 from nineaudit.report.numbers import DASH, digits, edge, quantity, seconds, sensor_edge, spelled
 from nineaudit.report.tables import Row
+from nineaudit.units import counted
 from nineaudit.waivers import CODE as WAIVERS
 
 if TYPE_CHECKING:
@@ -187,8 +188,8 @@ def _identifier(x: Identifier) -> Row:
     wrong += [f"{c.signal}: {c.repeated} numbers repeated" for c in x.counters if c.repeated]
     wrong += [f"{c.signal}: {c.wrong} checksums wrong" for c in x.checksums if c.wrong]
     wrong += [f"{o.signal}: {o.count} values outside {o.low:g} to {o.high:g} {o.unit}".rstrip() for o in x.outside]
-    wrong += [f"{signal}: {frames} times not available" for signal, frames in x.unavailable]
-    wrong += [f"{n} frames {word} than the database has them" for n, word in _lengths(x) if n]
+    wrong += [f"{signal}: {counted(frames, 'time')} not available" for signal, frames in x.unavailable]
+    wrong += [f"{counted(n, 'frame')} {word} than the database has them" for n, word in _lengths(x) if n]
     wrong += ["no byte ever changes"] if x.constant and x.frames > 1 else []
     return {
         "id": x.number,

@@ -13,6 +13,7 @@ from nineaudit.physics.spectrum import density
 from nineaudit.report.chart import Chart, Flags, Level, Line
 from nineaudit.report.figures import Figure, figure
 from nineaudit.report.numbers import digits, quantity, sensor_edge, spelled
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -36,8 +37,8 @@ def _raw(audit: Audit, k: int, marked: Sequence[str]) -> Figure:
     facts = [f"{sensor.kind}, {_reach(values, unit)}"]
     facts += [f"range ±{quantity(sensor.full_scale / one, unit)}"] if sensor.full_scale else []
     facts += [f"zero {quantity(float(audit.zero[k]) / one, unit)}"] if audit.rest else []
-    facts += [f"{int(mask.sum())} samples flagged"] if mask.any() else []
-    facts += [f"{missing} samples invalid or missing"] if missing else []
+    facts += [f"{counted(int(mask.sum()), 'sample')} flagged"] if mask.any() else []
+    facts += [f"{counted(missing, 'sample')} invalid or missing"] if missing else []
     levels = [] if sensor.full_scale is None else [Level(sign * sensor.full_scale / one, "range") for sign in (1, -1)]
     levels += [Level(float(audit.zero[k]) / one, "zero")] if audit.rest else []
     chart = Chart(

@@ -6,6 +6,7 @@ import hashlib
 from typing import TYPE_CHECKING
 
 from nineaudit.report.numbers import quantity, seconds
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -60,7 +61,7 @@ def _remade(audit: Audit) -> list[list[tuple[str, str, bool]]]:
     """What of the recording is made, not measured: rows of each repair."""
     return [
         [
-            ("Reconstructed, not measured", f"{made.channel}: {made.samples} samples; {made.method}", False),
+            ("Reconstructed, not measured", f"{made.channel}: {counted(made.samples, 'sample')}; {made.method}", False),
             ("SHA-256 of the original of that", made.original, True),
         ]
         for made in audit.recording.remade

@@ -14,6 +14,7 @@ import numpy as np
 from nineaudit.array import FloatArray, Sensor
 from nineaudit.recording import Recording
 from nineaudit.signals import in_unit
+from nineaudit.units import counted
 from nineaudit.writers.mme_place import CHANNEL
 from nineaudit.writers.outcome import Outcome
 
@@ -104,7 +105,7 @@ def _channel(recording: Recording, readings: FloatArray, column: int, clock: Hea
     if valid.any():
         keys |= _extremes(values, recording.time)
     if changed:
-        keys["Comments"] = f"{changed} samples rebuilt by nineaudit; the original is not altered"
+        keys["Comments"] = f"{counted(changed, 'sample')} rebuilt by nineaudit; the original is not altered"
     return keys, values
 
 

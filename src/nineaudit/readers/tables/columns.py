@@ -16,7 +16,7 @@ from nineaudit.readers.tables.dialect import base
 from nineaudit.readers.tables.preamble import TIME_NAME, unit_in_name
 from nineaudit.recording import Damage, Trace
 from nineaudit.signals import QUANTITY, suggestion, time_unit
-from nineaudit.units import factor
+from nineaudit.units import counted, factor
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
@@ -113,7 +113,7 @@ def contents(
         "invalid_cells": int(sum(np.count_nonzero(np.isnan(v)) for v in readings)),
         "rows_without_time": unplaced,
     }
-    lost = (f"{unplaced} rows without a time stamp are left out",) if unplaced else ()
+    lost = (f"{counted(unplaced, 'row')} without a time stamp left out",) if unplaced else ()
     return Contents(traces, counts, (*columns.notes, *notes, *lost), tuple(damage))
 
 

@@ -14,7 +14,7 @@ from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import Contents, cut_short
 from nineaudit.readers.tables import columns
 from nineaudit.recording import Damage
-from nineaudit.units import factor
+from nineaudit.units import counted, factor
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
@@ -76,7 +76,7 @@ def _groups(file: Any, wanted: Sequence[str]) -> tuple[list[Any], list[Damage]]:
         return groups, []
     rows = sum(file.metadata.row_group(index).num_rows for index, _ in lost)
     what = f"a group of rows that cannot be read: {lost[0][1]}"
-    return groups, [Damage(what, f"row group {lost[0][0] + 1}", len(lost), f"{rows} rows are left out")]
+    return groups, [Damage(what, f"row group {lost[0][0] + 1}", len(lost), f"{counted(rows, 'row')} left out")]
 
 
 def _units(schema: Any) -> dict[int, str]:
