@@ -151,3 +151,26 @@ def test_the_best_of_the_small_faults_is_always_looked_at():
     found = answer("triax-3", "general", "a2x:position=10mm", 3202)
     assert found.channels == ("a2x",)
     assert found.candidates[0].fault == "position"
+
+
+@pytest.mark.parametrize(
+    ("preset", "fault", "seed"),
+    [
+        ("6aw", "a0y:delay=0.2ms", 5030),  # what its delay may have lost by chance was held against it
+        ("naap-3222", "a3y:delay=0.5ms", 5207),
+        ("6aw", "a1y:gain=-10%", 5044),  # without it, time skews counted for nothing though rates told α: not looked at
+    ],
+)
+def test_the_culprit_stays_in_the_group_where_little_is_told(preset, fault, seed):
+    found = answer(preset, "drop", fault, seed)
+    assert found.status is Status.AMBIGUOUS
+    assert fault.split(":")[0] in found.channels
+
+
+def test_rates_on_three_axes_tell_alpha_where_accelerometers_do_not():
+    case = Case(simulate(parse_rig(preset_text("6aw")), "drop", seed=1).recording)
+    alone = hypotheses.masked(case.healthy.data, case.array.index("a1y"))
+    assert not alone.bridge.any()
+    assert alone.sloped.all()
+    still = hypotheses.masked(alone, case.array.index("gz"))
+    assert still.bridge.all()

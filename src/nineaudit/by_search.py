@@ -145,12 +145,13 @@ def _floor(search: Search) -> float:
     return max(1.0, min(x.statistic for x in search.found))
 
 
-def _scores(search: Search) -> dict[tuple[int, ...], float]:
-    """Best evidence of each channel (or pair), in nats of the noise as found."""
+def _scores(search: Search, chance: bool = False) -> dict[tuple[int, ...], float]:
+    """Best evidence of each channel (or pair), in nats of the noise as found; with what `chance` may have cost it."""
     scale = _floor(search)
     out: dict[tuple[int, ...], float] = {}
     for x in search.found:
-        out.setdefault(x.channels, x.evidence / scale)
+        score = (x.evidence + chance * x.chance) / scale
+        out[x.channels] = max(score, out.get(x.channels, score))
     return out
 
 
@@ -159,8 +160,8 @@ def _group(search: Search, best: Hypothesis, floor: float) -> list[tuple[int, ..
     scores = _scores(search)
     odds = ODDS_NATS if len(best.channels) == 1 or best.word == "swap" else FAR
     whole = {x.channels for x in search.found if x.statistic <= UNEXPLAINED * floor}
-    untold = UNTOLD * scores[best.channels]
-    near = [c for c, score in scores.items() if scores[best.channels] - score < odds + untold * (c in whole)]
+    untold, lucky = UNTOLD * scores[best.channels], _scores(search, chance=True)
+    near = [c for c, score in lucky.items() if scores[best.channels] - score < odds + untold * (c in whole)]
     if len(best.channels) == 1 and best.channels[0] in search.without and _is_waveform(search, best):
         channel, data = best.channels[0], search.healthy.data
         mine, needed = search.without[channel], _separation(data)

@@ -37,7 +37,8 @@ LOOK = 8
 @dataclass(frozen=True)
 class Hypothesis:
     """`channels` (columns) with a fault of kind `word`: its log `evidence` (nats, relative to no fault), the cost per
-    degree of freedom `statistic`, and the fault's `parameters` (SI)."""
+    degree of freedom `statistic`, and the fault's `parameters` (SI). `chance`: by how many nats chance may have made the
+    evidence too small; a rival has the benefit of it."""
 
     channels: tuple[int, ...]
     word: str
@@ -45,6 +46,7 @@ class Hypothesis:
     statistic: float
     parameters: Mapping[str, float] = field(default_factory=dict)
     shape: Shape | None = field(default=None, repr=False, compare=False)
+    chance: float = 0.0
 
 
 def healthy_fit(data: Data) -> Fit:
@@ -75,8 +77,8 @@ def masked(data: Data, channel: int, samples: BoolArray | None = None) -> Data:
 
 
 def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) -> Fit:
-    """The fit without one channel, from the start whose first step leads lowest. EstimationError where the others do
-    not tell ω."""
+    """The fit without one channel, from the start whose first step leads lowest, and from the healthy fit too where that
+    ends above what the healthy fit itself costs without the channel. EstimationError where the others do not tell ω."""
     alone = masked(data, channel)
     starts = [healthy.omega]
     if data.array.is_accelerometer[channel]:
@@ -84,7 +86,12 @@ def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) ->
         certain = replace(alone, prior_sd=np.zeros_like(alone.prior_sd))
         first = [fit(certain, start, iterations=1) for start in starts]
         starts = [min(first, key=lambda f: f.cost).omega]
-    return fit(alone, starts[0], tolerance=ROUGH, hopeless=hopeless)
+    found = fit(alone, starts[0], tolerance=ROUGH, hopeless=hopeless)
+    theta = theta_for(alone, healthy)
+    if found.cost <= point(alone, healthy.omega, theta).cost:
+        return found
+    other = fit(alone, healthy.omega, theta, tolerance=ROUGH, hopeless=hopeless)
+    return min(found, other, key=lambda f: f.cost)
 
 
 def _starts_without(alone: Data, healthy: Fit) -> list[FloatArray]:

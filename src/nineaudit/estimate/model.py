@@ -108,13 +108,16 @@ class Data:
     def bridge(self) -> FloatArray:
         """(n,) precision (s²/rad²) with which ω stays over a sample whose valid channels do not tell α, though those of
         the record do, in five directions at least (of the sixth, products of ω may tell); where they never do, over one
-        without any valid channel."""
+        without any valid channel. Rates on three axes tell α by their slope."""
         patterns, which = self._valid
         as_stated = self.bent(np.zeros(len(self.channel)))
         design = np.hstack([as_stated.axes_a, as_stated.lever])
         every = int(np.linalg.matrix_rank(design[self.used])) if self.used.any() else 0
         rank = [int(np.linalg.matrix_rank(design[p])) if p.any() else 0 for p in patterns]
-        short = np.array([r < 6 if every >= 5 else not p.any() for r, p in zip(rank, patterns, strict=True)])
+        rates = [p & ~self.array.is_accelerometer for p in patterns]
+        turning = [r.any() and int(np.linalg.matrix_rank(self.array.axes[r])) == 3 for r in rates]
+        told = [t or (r >= 6 if every >= 5 else p.any()) for t, r, p in zip(turning, rank, patterns, strict=True)]
+        short = ~np.array(told, dtype=bool)
         return np.where(short[which], (ANY_ALPHA * self.step) ** -2, 0.0)
 
     @cached_property

@@ -92,9 +92,10 @@ def delayed(data: Data, left: Fit, channel: int, reference: float) -> Hypothesis
     place = np.flatnonzero((part.active[0] == channel) & (part.active[1] == _TIMING))
     rest = float(found.theta[place[0]]) * DELAY_SD if len(place) else 0.0
     used = float((weights[:, channel] > 0).sum())
-    price = 0.5 * (float((weight > 0).sum()) - used) + float(np.sqrt(2.4 * used)) + float(np.log(len(lags)))
+    chance = float(np.sqrt(2.4 * used))
+    price = 0.5 * (float((weight > 0).sum()) - used) + chance + float(np.log(len(lags)))
     evidence = log_evidence(found) - price - reference
-    return Hypothesis((channel,), "delay", evidence, found.statistic, {"size": lag * step + rest})
+    return Hypothesis((channel,), "delay", evidence, found.statistic, {"size": lag * step + rest}, chance=chance)
 
 
 def without_samples(data: Data, left: Fit, channel: int, wrong: BoolArray, reference: float) -> Hypothesis:
