@@ -37,8 +37,8 @@ LOOK = 8
 @dataclass(frozen=True)
 class Hypothesis:
     """`channels` (columns) with a fault of kind `word`: its log `evidence` (nats, relative to no fault), the cost per
-    degree of freedom `statistic`, and the fault's `parameters` (SI). `chance`: by how many nats chance may have made the
-    evidence too small; a rival has the benefit of it."""
+    degree of freedom `statistic`, and the fault's `parameters` (SI). `chance`: by how many nats chance may have
+    made the evidence too small; a rival has the benefit of it."""
 
     channels: tuple[int, ...]
     word: str
@@ -77,8 +77,8 @@ def masked(data: Data, channel: int, samples: BoolArray | None = None) -> Data:
 
 
 def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) -> Fit:
-    """The fit without one channel, from the start whose first step leads lowest, and from the healthy fit too where that
-    ends above what the healthy fit itself costs without the channel. EstimationError where the others do not tell ω."""
+    """The fit without one channel, from the start whose first step leads lowest, and from the healthy fit where that
+    ends above what the healthy fit costs without the channel. EstimationError where the others do not tell ω."""
     alone = masked(data, channel)
     starts = [healthy.omega]
     if data.array.is_accelerometer[channel]:
