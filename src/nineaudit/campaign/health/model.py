@@ -104,10 +104,12 @@ class Solution:
     cov: FloatArray
 
     def residual(self, marginal: Marginal) -> FloatArray:
-        """(J,p) η' − Λ' A x."""
-        at, design = designs(marginal.group, self.changes, len(self.part.unknowns))
-        predicted = design @ self.x[at]
-        return np.asarray(marginal.eta - np.einsum("jpq,jq->jp", marginal.matrix, predicted))
+        """(J,p) η' − Λ' θ̂, θ̂ = A x and what has changed."""
+        group, n = marginal.group, len(self.part.unknowns)
+        theta = np.broadcast_to(group.design @ self.x[group.at], marginal.eta.shape)
+        for k, column in moves(group, self.changes):
+            theta = theta + self.x[n + k] * column
+        return np.asarray(marginal.eta - (marginal.matrix @ theta[:, :, None])[:, :, 0])
 
 
 def parts(records: Sequence[Record]) -> list[Part]:
@@ -193,17 +195,10 @@ def marginal(group: Group, tau: Scatter) -> Marginal:
     return Marginal(group, eta, 0.5 * (matrix + matrix.transpose(0, 2, 1)))
 
 
-def designs(group: Group, changes: Sequence[Change], unknowns: int) -> tuple[IntArray, FloatArray]:
-    """(m + c,) places in Solution.x and (J,p,m+c) what they do to θ in each recording: the unknowns, and those changes
-    that touch them."""
-    here = [c for c, change in enumerate(changes) if change.unknown in group.at]
-    at = np.concatenate([group.at, unknowns + np.array(here, dtype=np.intp)])
-    out = np.empty((len(group.index), len(group.rows), len(at)))
-    out[:, :, : len(group.at)] = group.design
-    for k, c in enumerate(here):
-        column = group.design[:, int(np.flatnonzero(group.at == changes[c].unknown)[0])]
-        out[:, :, len(group.at) + k] = changes[c].amount[group.index][:, None] * column
-    return at, out
+def moves(group: Group, changes: Sequence[Change]) -> list[tuple[int, FloatArray]]:
+    """(number, (J,p) what it does to θ in each recording) of every change that touches a group."""
+    here = [(k, c, np.flatnonzero(group.at == c.unknown)) for k, c in enumerate(changes)]
+    return [(k, c.amount[group.index][:, None] * group.design[:, at[0]]) for k, c, at in here if len(at)]
 
 
 def solve(part: Part, tau: Scatter, changes: Sequence[Change] = ()) -> Solution:
@@ -214,8 +209,17 @@ def solve(part: Part, tau: Scatter, changes: Sequence[Change] = ()) -> Solution:
     normal[np.arange(n), np.arange(n)] = 1.0 / part.prior**2
     marginals = tuple(marginal(group, tau) for group in part.groups)
     for one in marginals:
-        at, design = designs(one.group, changes, n)
-        right[at] += np.einsum("jpm,jp->m", design, one.eta)
-        normal[np.ix_(at, at)] += np.einsum("jpm,jpk->mk", design, one.matrix @ design)
+        group = one.group
+        right[group.at] += group.design.T @ one.eta.sum(axis=0)
+        normal[np.ix_(group.at, group.at)] += group.design.T @ one.matrix.sum(axis=0) @ group.design
+        columns = moves(group, changes)
+        for k, column in columns:
+            told = (one.matrix @ column[:, :, None])[:, :, 0]
+            coupled = group.design.T @ told.sum(axis=0)
+            normal[group.at, n + k] += coupled
+            normal[n + k, group.at] += coupled
+            right[n + k] += float(np.sum(column * one.eta))
+            for other, theirs in columns:
+                normal[n + other, n + k] += float(np.sum(theirs * told))
     cov = np.linalg.inv(normal)
     return Solution(part, tuple(changes), marginals, cov @ right, 0.5 * (cov + cov.T))

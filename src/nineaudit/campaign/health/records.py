@@ -64,6 +64,16 @@ class Record:
     shock: Mapping[str, float]
 
 
+@dataclass(frozen=True, eq=False)
+class Stated:
+    """Rows of a recording, UNIT over prior of each (`scale`), Q (`turn`, None: nothing restated) and c (`moved`)."""
+
+    rows: tuple[Row, ...]
+    scale: FloatArray
+    turn: FloatArray | None
+    moved: FloatArray
+
+
 @dataclass(eq=False)
 class First:
     """What rigs said first of each sensor and seat."""
@@ -72,6 +82,7 @@ class First:
     place: dict[Seat, FloatArray] = field(default_factory=dict)
     axis: dict[Seat, FloatArray] = field(default_factory=dict)
     restated: set[str] = field(default_factory=set)
+    stated: dict[str, Stated] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -121,19 +132,33 @@ def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
 
 
 def _record(uri: str, label: str, when: float, rig: str, block: Mapping[str, Any], first: First) -> Record:
-    channels = {c["channel"]: c for c in block["channels"]}
     told = block["information"]
-    prior = np.array(told["prior"], dtype=np.float64)
-    names = [(str(c), str(p)) for c, p in told["parameters"]]
-    seats = {c: _seat(rig, channels[c], first) for c in {name for name, _ in names}}
-    rows = tuple(_row(rig, channels[c], p, u, seats[c]) for (c, p), u in zip(names, prior, strict=True))
+    stated = _stated(rig, block, first)
     eta, matrix = unpacked(told)
-    scale = np.array([UNIT[family(row.parameter)] for row in rows]) / prior
-    eta, matrix = scale * eta, scale[:, None] * matrix * scale
-    turn, moved = _restated(rows, channels, names, first)
-    matrix = turn @ matrix @ turn.T
-    shock = {_sensor(rig, c): float(c["shock"] or 0.0) for c in channels.values()}
-    return Record(uri, label, when, rows, turn @ eta + matrix @ moved, matrix, shock)
+    eta, matrix = stated.scale * eta, stated.scale[:, None] * matrix * stated.scale
+    if stated.turn is not None:
+        matrix = stated.turn @ matrix @ stated.turn.T
+        eta = stated.turn @ eta + matrix @ stated.moved
+    shock = {_sensor(rig, c): float(c["shock"] or 0.0) for c in block["channels"]}
+    return Record(uri, label, when, stated.rows, eta, matrix, shock)
+
+
+def _stated(rig: str, block: Mapping[str, Any], first: First) -> Stated:
+    """What the rig file says of the rows of a recording: the same for most recordings of a rig, and made once."""
+    told = block["information"]
+    named = ("channel", "serial", "kind", "scale", "position", "axis")
+    key = repr((rig, [[c[n] for n in named] for c in block["channels"]], told["parameters"], told["prior"]))
+    if key not in first.stated:
+        channels = {c["channel"]: c for c in block["channels"]}
+        prior = np.array(told["prior"], dtype=np.float64)
+        names = [(str(c), str(p)) for c, p in told["parameters"]]
+        seats = {c: _seat(rig, channels[c], first) for c in dict.fromkeys(name for name, _ in names)}
+        rows = tuple(_row(rig, channels[c], p, u, seats[c]) for (c, p), u in zip(names, prior, strict=True))
+        scale = np.array([UNIT[family(row.parameter)] for row in rows]) / prior
+        turn, moved = _restated(rows, channels, names, first)
+        same = not moved.any() and np.array_equal(turn, np.eye(len(rows)))
+        first.stated[key] = Stated(rows, scale, None if same else turn, moved)
+    return first.stated[key]
 
 
 def _sensor(rig: str, channel: Mapping[str, Any]) -> str:

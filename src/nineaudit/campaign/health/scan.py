@@ -23,7 +23,7 @@ from typing import Final
 import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
-from nineaudit.campaign.health.model import Change, Marginal, Solution, designs
+from nineaudit.campaign.health.model import Change, Marginal, Solution, moves
 
 BINS: Final = 50
 LEAST_SIDE: Final = 3
@@ -88,52 +88,63 @@ def scan(solution: Solution, size: int) -> list[Found]:
 
 def tracks(solution: Solution) -> Iterator[Track]:
     """Every unknown with recordings enough."""
-    prepared = [_prepared(one, solution) for one in solution.marginals]
+    residuals = [solution.residual(one) for one in solution.marginals]
     for unknown in range(len(solution.part.unknowns)):
-        pieces = [_piece(unknown, one, *ready) for one, ready in zip(solution.marginals, prepared, strict=True)]
-        mine = [piece for piece in pieces if piece is not None]
-        if sum(len(piece[0]) for piece in mine) >= LEAST_RECORDINGS:
-            yield _track(unknown, mine)
+        pairs = zip(solution.marginals, residuals, strict=True)
+        mine = [_piece(unknown, one, residual) for one, residual in pairs if unknown in one.group.at]
+        if sum(len(piece.index) for piece in mine) >= LEAST_RECORDINGS:
+            yield _track(unknown, mine, solution)
 
 
-Ready = tuple[FloatArray, IntArray, FloatArray]
-Piece = tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray]
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """What one group says of an unknown: `index`, `when`, `shock`, score `r` and information `info` (J,), and `told`
+    (J,p) what its recordings say of it with every other error."""
+
+    marginal: Marginal
+    index: IntArray
+    when: FloatArray
+    shock: FloatArray
+    r: FloatArray
+    info: FloatArray
+    told: FloatArray
 
 
-def _prepared(one: Marginal, solution: Solution) -> Ready:
-    at, design = designs(one.group, solution.changes, len(solution.part.unknowns))
-    return solution.residual(one), at, one.matrix @ design
-
-
-def _piece(unknown: int, one: Marginal, residual: FloatArray, at: IntArray, told: FloatArray) -> Piece | None:
-    """What one group says of an unknown: index, when, shock, r, info (J,), g (J,m), at (m,)."""
+def _piece(unknown: int, one: Marginal, residual: FloatArray) -> Piece:
     group = one.group
-    where = np.flatnonzero(group.at == unknown)
-    if not len(where):
-        return None
-    column = group.design[:, where[0]]
-    rows = np.flatnonzero(column)
-    info = one.matrix[:, rows][:, :, rows].sum(axis=(1, 2))
-    r, g = residual[:, rows].sum(axis=1), told[:, rows].sum(axis=1)
-    return group.index, group.when, group.shock[:, rows[0]], r, info, g, at
+    rows = np.flatnonzero(group.design[:, np.flatnonzero(group.at == unknown)[0]])
+    told = one.matrix[:, rows].sum(axis=1)
+    info, r = told[:, rows].sum(axis=1), residual[:, rows].sum(axis=1)
+    return Piece(one, group.index, group.when, group.shock[:, rows[0]], r, info, told)
 
 
-def _track(unknown: int, pieces: Sequence[Piece]) -> Track:
-    index = np.concatenate([p[0] for p in pieces])
+def _coupled(piece: Piece, bins: IntArray, count: int, solution: Solution) -> tuple[FloatArray, list[int]]:
+    """(B,m) by bin, and which entries of the solution (m,)."""
+    group, n = piece.marginal.group, len(solution.part.unknowns)
+    member = np.zeros((count, len(bins)))
+    member[bins, np.arange(len(bins))] = 1.0
+    columns = moves(group, solution.changes)
+    changed = [member @ (piece.told * column).sum(axis=1) for _, column in columns]
+    by_bin = np.column_stack([member @ piece.told @ group.design, *changed])
+    return by_bin, [*group.at.tolist(), *(n + k for k, _ in columns)]
+
+
+def _track(unknown: int, pieces: Sequence[Piece], solution: Solution) -> Track:
+    index = np.concatenate([p.index for p in pieces])
     order = np.argsort(index)
-    at = np.unique(np.concatenate([p[6] for p in pieces]))
     rank = np.empty(len(index), dtype=np.intp)
     rank[order] = np.arange(len(index))
     bins = rank * min(BINS, len(index)) // len(index)
     count = int(bins.max()) + 1
-    coupling, start = np.zeros((count, len(at))), 0
-    for piece in pieces:
-        mine = np.zeros((count, len(piece[0])))
-        mine[bins[start : start + len(piece[0])], np.arange(len(piece[0]))] = 1.0
-        coupling[:, np.searchsorted(at, piece[6])] += mine @ piece[5]
-        start += len(piece[0])
-    when, shock, r, info = (np.concatenate([p[k] for p in pieces])[order] for k in (1, 2, 3, 4))
+    cuts = np.cumsum([len(p.index) for p in pieces])[:-1]
+    by_piece = [_coupled(p, b, count, solution) for p, b in zip(pieces, np.split(bins, cuts), strict=True)]
+    at = np.unique([place for _, places in by_piece for place in places])
+    coupling = np.zeros((count, len(at)))
+    for values, places in by_piece:
+        coupling[:, np.searchsorted(at, places)] += values
     bins = bins[order]
+    when, shock = (np.concatenate([getattr(p, name) for p in pieces])[order] for name in ("when", "shock"))
+    r, info = (np.concatenate([getattr(p, name) for p in pieces])[order] for name in ("r", "info"))
     z = r / np.sqrt(np.maximum(info, LEAST_INFORMATION))
     by_bin, info_by_bin = (np.asarray(np.bincount(bins, v, count), dtype=np.float64) for v in (r, info))
     return Track(unknown, index[order], when, shock, z, info, bins, by_bin, info_by_bin, coupling, at)

@@ -14,21 +14,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nineaudit.campaign.health.model import Change, Part, Scatter, Solution, designs, solve
+from nineaudit.array import FloatArray, IntArray
+from nineaudit.campaign.health.model import Change, Marginal, Part, Scatter, Solution, moves, solve
 from nineaudit.campaign.health.records import family
 
-ROUNDS, SETTLED, LEAST = 30, 0.01, 1e-6
-MANY = 400
+ROUNDS, SETTLED, LEAST = 25, 0.02, 1e-6
+MANY = 250
 """Recordings that are enough to tell five variances."""
 
 
-def estimate_scatter(parts: Sequence[Part], changes: Sequence[Sequence[Change]]) -> Scatter:
-    """The variances, of up to MANY recordings spread over the campaign."""
+def estimate_scatter(
+    parts: Sequence[Part], changes: Sequence[Sequence[Change]], start: Scatter | None = None
+) -> Scatter:
+    """The variances, of up to MANY recordings spread over the campaign, from `start` on."""
     everything = np.sort(np.concatenate([g.index for part in parts for g in part.groups]))
     chosen = everything[np.unique(np.linspace(0, len(everything) - 1, min(MANY, len(everything))).astype(int))]
     some = [part.take(chosen) for part in parts]
     families = sorted({(r.kind, family(r.parameter)) for part in parts for g in part.groups for r in g.rows})
-    tau = dict.fromkeys(families, 0.2**2)
+    tau = dict.fromkeys(families, 0.2**2) | (start or {})
     for _ in range(ROUNDS):
         ratio = _ratios([solve(p, tau, c) for p, c in zip(some, changes, strict=True) if p.groups], tau)
         tau = {f: max(tau[f] * ratio[f], LEAST) for f in families}
@@ -37,13 +40,21 @@ def estimate_scatter(parts: Sequence[Part], changes: Sequence[Sequence[Change]])
     return tau
 
 
+def coupling(one: Marginal, solution: Solution) -> tuple[FloatArray, IntArray]:
+    """(J,p,m) Λ' times what each entry of the solution does to θ, and which entries (m,)."""
+    columns = moves(one.group, solution.changes)
+    told = one.matrix @ one.group.design
+    more = [one.matrix @ column[:, :, None] for _, column in columns]
+    place = [len(solution.part.unknowns) + k for k, _ in columns]
+    return np.concatenate([told, *more], axis=2), np.concatenate([one.group.at, np.array(place, dtype=np.intp)])
+
+
 def _ratios(solutions: Sequence[Solution], tau: Scatter) -> Scatter:
     seen, meant = dict.fromkeys(tau, 1e-12), dict.fromkeys(tau, 1e-12)
     for solution in solutions:
         for one in solution.marginals:
-            at, design = designs(one.group, solution.changes, len(solution.part.unknowns))
-            told = one.matrix @ design
-            taken = np.einsum("jpm,mk,jpk->p", told, solution.cov[np.ix_(at, at)], told, optimize=True)
+            told, at = coupling(one, solution)
+            taken = ((told @ solution.cov[np.ix_(at, at)]) * told).sum(axis=(0, 2))
             expected = np.einsum("jpp->p", one.matrix) - taken
             found = (solution.residual(one) ** 2).sum(axis=0)
             for i, row in enumerate(one.group.rows):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import log
 from typing import Final
 
-from nineaudit.campaign.health.model import Part, Scatter, Solution, solve
+from nineaudit.campaign.health.model import Change, Part, Scatter, Solution, solve
 from nineaudit.campaign.health.scan import Found, change, outlying, scan, threshold
 from nineaudit.campaign.health.scatter import estimate_scatter
 
@@ -40,37 +40,46 @@ class Selection:
 
 
 def select(parts: Sequence[Part], size: int) -> Selection:
-    """Forward selection over all parts; `size`: recordings of the campaign."""
+    """Forward selection in every part; `size`: recordings of the campaign.
+
+    Parts have nothing in common but the scatter: each goes on until nothing in it is significant, then the scatter is
+    estimated anew and all are looked at again.
+    """
     kept, out = list(parts), list[int]()
     changes: list[list[Selected]] = [[] for _ in parts]
+    scatter: Scatter | None = None
     while True:
-        scatter, solutions = _solved(kept, changes)
-        found = [(abs(f.z), i, f, ranked) for i, ranked in enumerate(_scans(solutions, size)) for f in ranked[:1]]
-        top = max(found, key=lambda item: item[0], default=None)
-        if top is None or top[0] < threshold() or sum(map(len, changes)) >= MOST_CHANGES:
-            return Selection(tuple(kept), tuple(solutions), tuple(map(tuple, changes)), scatter, tuple(sorted(out)))
-        _, i, best, ranked = top
-        bad = outlying(best)
-        if len(bad) and len(out) < MOST_OUTLYING:
-            out.extend(int(b) for b in bad)
-            kept[i] = kept[i].take(_indices(kept[i]) - set(out))
-        else:
-            changes[i].append(Selected(best, tuple(f for f in ranked[1:] if best.z**2 - f.z**2 < MARGIN)))
+        shapes = [_shapes(mine) for mine in changes]
+        scatter = estimate_scatter(kept, shapes, scatter)
+        before = sum(map(len, changes)), len(out)
+        solutions = []
+        for i in range(len(kept)):
+            kept[i], solution = _grown(kept[i], changes[i], out, scatter, size)
+            solutions.append(solution)
+        if before == (sum(map(len, changes)), len(out)):
+            final = tuple(map(tuple, changes))
+            return Selection(tuple(kept), tuple(solutions), final, scatter, tuple(sorted(out)))
 
 
-def _solved(parts: Sequence[Part], changes: Sequence[Sequence[Selected]]) -> tuple[Scatter, list[Solution]]:
-    shapes = [[change(one.found) for one in mine] for mine in changes]
-    scatter = estimate_scatter(parts, shapes)
-    return scatter, [solve(part, scatter, some) for part, some in zip(parts, shapes, strict=True)]
-
-
-def _scans(solutions: Sequence[Solution], size: int) -> list[list[Found]]:
-    """Significance of what is not changed yet, by part; an unknown changes once."""
-    out = []
-    for solution in solutions:
+def _grown(part: Part, changes: list[Selected], out: list[int], scatter: Scatter, size: int) -> tuple[Part, Solution]:
+    """The part with every significant change added to `changes`, without the recordings added to `out`."""
+    while True:
+        solution = solve(part, scatter, _shapes(changes))
         known = {one.unknown for one in solution.changes}
-        out.append([f for f in scan(solution, size) if f.unknown not in known])
-    return out
+        ranked = [f for f in scan(solution, size) if f.unknown not in known]
+        if not ranked or abs(ranked[0].z) < threshold() or len(changes) >= MOST_CHANGES:
+            return part, solution
+        best = ranked[0]
+        bad = outlying(best) if len(out) < MOST_OUTLYING else ()
+        if len(bad):
+            out.extend(int(b) for b in bad)
+            part = part.take(_indices(part) - set(out))
+        else:
+            changes.append(Selected(best, tuple(f for f in ranked[1:] if best.z**2 - f.z**2 < MARGIN)))
+
+
+def _shapes(changes: Sequence[Selected]) -> list[Change]:
+    return [change(one.found) for one in changes]
 
 
 def _indices(part: Part) -> set[int]:
