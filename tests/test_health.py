@@ -17,9 +17,12 @@ from nineaudit.campaign.health.scan import scan, threshold
 from nineaudit.campaign.health.scatter import estimate_scatter
 from nineaudit.campaign.health.words import document, sentence, text_table
 from nineaudit.case import Case
+from nineaudit.estimate.calibration import PARAMETERS, perpendicular
 from nineaudit.estimate.information import information
+from nineaudit.reconstruct import slow_noise
 from nineaudit.rig import parse_rig, preset_text
-from nineaudit.simulate import simulate
+from nineaudit.simulate import Simulation, simulate
+from nineaudit.simulate.instrument import across
 
 SMALL = Plan(rigs=1, channels=3, tests=8, swaps=1, tilts=True)
 TAU = {("accelerometer", "gain"): 0.1, ("accelerometer", "tilt"): 0.05}
@@ -259,3 +262,31 @@ def test_a_drift_of_2_percent_in_one_of_40_is_found_by_its_serial_number() -> No
         wrong += bool(named - {culprit})
     assert right >= binom.ppf(0.01, 40, 0.95)
     assert wrong <= 1
+
+
+def test_what_one_recording_says_is_as_uncertain_as_it_says() -> None:
+    """η − Λ θ against the drawn errors of simulated instruments: N(0, Λ) in every direction that is seen."""
+    rig = parse_rig(preset_text("naap-3222"))
+    total, count = 0.0, 0
+    for seed in range(4):
+        made = simulate(rig, "general", seed=40 + seed, rate_hz=10_000.0)
+        case = Case(made.recording)
+        told = information(case.healthy, colour=slow_noise(case))
+        true = np.array([_drawn_error(made, c, p) for c, p in zip(told.channel, told.parameter, strict=True)])
+        values, vectors = np.linalg.eigh(told.matrix)
+        seen = values > 0.01
+        left = vectors.T @ (told.eta - told.matrix @ (true / told.prior))
+        total += float((left[seen] ** 2 / values[seen]).sum())
+        count += int(seen.sum())
+    assert count > 80
+    assert 0.7 < total / count < 1.4  # χ² of 100 degrees has a relative sd of 0.14; linearised about the fit
+
+
+def _drawn_error(made: Simulation, channel: int, parameter: int) -> float:
+    name = PARAMETERS[parameter]
+    axis = made.recording.rig.array.axes[channel]
+    if name == "gain":
+        return float(made.drawn["gain"][channel])
+    if name.startswith("tilt"):
+        return float(perpendicular(axis)[int(name[-1]) - 1] @ (made.drawn["tilt"][channel] @ across(axis)))
+    return float(made.drawn["position"][channel]["xyz".index(name[-1])])
