@@ -31,7 +31,8 @@ def harmful(request: dict[str, Any]) -> dict[str, Any]:
     return requests.perform(request)
 
 
-def slow(request: dict[str, Any]) -> dict[str, Any]:
-    """An audit that takes half a second more."""
-    time.sleep(0.5)
+def three(request: dict[str, Any]) -> dict[str, Any]:
+    """The audit of T0, T1 and T2; of others one that never ends."""
+    if not request["uri"].endswith(("T0.csv", "T1.csv", "T2.csv")):
+        time.sleep(1e6)
     return requests.perform(request)

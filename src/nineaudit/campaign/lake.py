@@ -52,6 +52,9 @@ class Lake:
 
 def open_lake(uri: str | os.PathLike[str], create: bool = False) -> Lake:
     """The lake at any fsspec URI (a folder, s3://, memory://). ConfigurationError: it is none, or cannot be made."""
+    from nineaudit.campaign.extra import require
+
+    require("fsspec")
     from fsspec.core import url_to_fs
 
     named = os.fspath(uri)

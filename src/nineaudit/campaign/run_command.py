@@ -68,7 +68,9 @@ def run(
     scheduler went away, 130 after Ctrl-C. Nothing that was finished is lost: run it again with --resume.
     """
     from nineaudit.campaign.campaigning import Plan
+    from nineaudit.campaign.extra import require
 
+    require("dask", "distributed", "fsspec", "psutil")
     return Plan(
         sources=tuple(sources),
         lake=lake,
