@@ -46,13 +46,20 @@ def unpacked(block: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
 
 
 def _packed(told: Information, rig: Rig) -> dict[str, Any]:
-    names = rig.array.channels
+    names, upper = rig.array.channels, np.triu_indices(len(told.eta))
+    size = np.sqrt(np.maximum(np.diag(told.matrix), 1e-12))
     return {
         "parameters": [[names[c], PARAMETERS[p]] for c, p in zip(told.channel, told.parameter, strict=True)],
         "prior": plain(told.prior),
-        "eta": _text(told.eta),
-        "matrix": _text(told.matrix[np.triu_indices(len(told.eta))]),
+        "eta": _text(_cut(told.eta, size)),
+        "matrix": _text(_cut(told.matrix, np.outer(size, size))[upper]),
     }
+
+
+def _cut(values: FloatArray, size: FloatArray) -> FloatArray:
+    """To a millionth of `size`, a power of two: what rounding makes of the last digits is another on each machine."""
+    step = 2.0 ** (np.floor(np.log2(size)) - 20.0)
+    return np.asarray(np.round(values / step) * step)
 
 
 def _text(values: FloatArray) -> str:
