@@ -59,6 +59,14 @@ def test_combined_likelihoods_are_the_joint_least_squares_of_all_unknowns() -> N
     np.testing.assert_allclose(found.cov, cov[: n + 2, : n + 2], rtol=1e-7, atol=1e-9)
 
 
+def test_a_change_that_no_recording_shows_is_nothing() -> None:
+    """The scatter is estimated from some of the recordings: there may be none on one side of a change."""
+    (part,) = parts(drawn(SMALL, 1).records.records)
+    found = solve(part, TAU, (Change(0, np.zeros(SMALL.tests)),))
+    assert found.x[-1] == 0.0
+    np.testing.assert_allclose(found.x[:-1], solve(part, TAU).x, rtol=1e-9, atol=1e-12)
+
+
 def test_two_halves_of_a_recording_say_what_the_whole_says() -> None:
     """The prior is in the model once, however many recordings there are."""
     plan = replace(SMALL, tests=4, swaps=0)

@@ -17,11 +17,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
 from nineaudit.campaign.health.records import Record, Row, Seat, family
+
+ANY_CHANGE: Final = 1e5
+"""Prior standard deviation of a change, in records.UNIT: of one that no recording shows, 0 is as good as any."""
 
 Scatter = dict[tuple[str, str], float]
 """Kind and family of an error -> variance from test to test, in records.UNIT squared."""
@@ -202,11 +206,12 @@ def moves(group: Group, changes: Sequence[Change]) -> list[tuple[int, FloatArray
 
 
 def solve(part: Part, tau: Scatter, changes: Sequence[Change] = ()) -> Solution:
-    """The unknowns and the changes, by the model's equations; a change has no prior."""
+    """The unknowns and the changes, by the model's equations; a change has hardly a prior."""
     n = len(part.unknowns)
     size = n + len(changes)
     normal, right = np.zeros((size, size)), np.zeros(size)
     normal[np.arange(n), np.arange(n)] = 1.0 / part.prior**2
+    normal[np.arange(n, size), np.arange(n, size)] = ANY_CHANGE**-2.0
     marginals = tuple(marginal(group, tau) for group in part.groups)
     for one in marginals:
         group = one.group
