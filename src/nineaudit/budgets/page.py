@@ -6,8 +6,9 @@ from nineaudit.array import FloatArray
 from nineaudit.budgets.compute import Budget
 from nineaudit.budgets.text import notes, tables
 from nineaudit.report.chart import Chart, Line
-from nineaudit.report.page import style, template
-from nineaudit.report.svg import draw
+from nineaudit.report.figures import Figure, figure
+from nineaudit.report.page import ZOOMS, script, template
+from nineaudit.report.zoom import store, zoomable
 
 _QUANTITIES = {
     "α": ("angular acceleration", "rad/s²"),
@@ -19,17 +20,22 @@ _STYLES = ("rebuilt", "axis-x", "axis-y")
 
 def render(budget: Budget) -> str:
     """The page."""
-    from markupsafe import Markup
-
+    drawn = zoomable(figures(budget))
     return template("budget.html.j2").render(
-        **style(),
+        **script(ZOOMS),
         name=budget.rig.name,
         subject=budget.subject,
         notes=notes(budget),
         tables=tables(budget),
         way=_way(budget),
-        charts=[{"title": c.title, "unit": c.unit, "svg": Markup(draw(c)), "lines": c.lines} for c in charts(budget)],
+        figures=drawn,
+        store=store(drawn),
     )
+
+
+def figures(budget: Budget) -> list[Figure]:
+    """The charts with their captions and legends."""
+    return [figure(chart, f"{chart.title}, {chart.unit}") for chart in charts(budget)]
 
 
 def charts(budget: Budget) -> list[Chart]:

@@ -11,9 +11,9 @@ from nineaudit.recording import Recording
 from nineaudit.report.chart import Chart, Line
 from nineaudit.report.figures import Figure, figure
 from nineaudit.report.numbers import digits, edge, spelled
-from nineaudit.report.page import style as sheet
-from nineaudit.report.page import template
+from nineaudit.report.page import ZOOMS, script, template
 from nineaudit.report.scheme_styles import classes, css, groups
+from nineaudit.report.zoom import store, zoomable
 
 HEADERS = (
     "scheme", "curve", "unit", "r", "r 2.5 ms", "ISO 18571", "grade", "peak", "difference", "U", "ratio", "budget",
@@ -63,7 +63,8 @@ def _heading(comparison: Comparison, recording: Recording) -> str:
 
 def render(comparison: Comparison, recording: Recording) -> str:
     """The page: the same table, and the curves of all schemes over each other."""
-    context: dict[str, Any] = sheet(css()) | {
+    drawn = zoomable(figures(comparison, recording))
+    context: dict[str, Any] = script(ZOOMS, more=css()) | {
         "name": recording.source.path.name,
         "rig": recording.rig.name,
         "sentence": _heading(comparison, recording),
@@ -73,7 +74,8 @@ def render(comparison: Comparison, recording: Recording) -> str:
         "headers": HEADERS,
         "rows": [(row.explained, cells(row, recording)) for row in comparison.rows],
         "refused": list(comparison.refused.items()),
-        "figures": figures(comparison, recording),
+        "figures": drawn,
+        "store": store(drawn),
     }
     return template("comparison.html.j2").render(context) + "\n"
 

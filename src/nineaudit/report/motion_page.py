@@ -11,7 +11,7 @@ from nineaudit.finding import COVERAGE_FACTOR
 from nineaudit.report.chart import Band, Chart, Line
 from nineaudit.report.figures import AXES, Figure, figure
 from nineaudit.report.numbers import DASH, digits, edge, quantity, spelled
-from nineaudit.report.page import script, template
+from nineaudit.report.page import ZOOMS, script, template
 from nineaudit.report.zoom import store, zoomable
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ ANGLES = ("yaw", "pitch", "roll")
 def render_motion(found: Kinematics, rig: Rig, name: str) -> str:
     """The page as a string of HTML; `name` of the recording."""
     drawn = zoomable(figures(found, rig))
-    context = script() | {
+    context = script(ZOOMS) | {
         "name": name,
         "rig": rig.name,
         "method": found.method,

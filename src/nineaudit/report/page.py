@@ -105,7 +105,8 @@ def _drawn(figure: Figure) -> Any:
     return Markup(figure.svg)
 
 
-SCRIPTS = ("vendor/uplot/uPlot.iife.min.js", "templates/zoom.js", "templates/review.js")
+ZOOMS = ("vendor/uplot/uPlot.iife.min.js", "templates/zoom.js")
+SCRIPTS = (*ZOOMS, "templates/review.js")
 
 
 def style(more: str = "") -> dict[str, Any]:
@@ -119,13 +120,13 @@ def style(more: str = "") -> dict[str, Any]:
 ZOOM_STYLE = "vendor/uplot/uPlot.min.css"
 
 
-def script(names: Sequence[str] = SCRIPTS, sheet: str = ZOOM_STYLE) -> dict[str, Any]:
-    """The style sheet with `sheet`, the scripts of a page (of one that can zoom and be reviewed), and the policy that
-    allows just these."""
+def script(names: Sequence[str] = SCRIPTS, sheet: str = ZOOM_STYLE, more: str = "") -> dict[str, Any]:
+    """The style sheet with `sheet` and `more` rules, the scripts of a page (of one that can zoom and be reviewed), and
+    the policy that allows just these."""
     from markupsafe import Markup
 
     code = "\n" + "\n".join(_packaged(name) for name in names)
-    styled = style("\n" + _packaged(sheet) + "\n")
+    styled = style("\n" + _packaged(sheet) + "\n" + more)
     policy = _policy(f"script-src {_digest(code)}; style-src {_digest(styled['css'])}")
     return styled | {"script": Markup(code), "csp": policy}
 

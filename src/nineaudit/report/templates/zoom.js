@@ -49,8 +49,10 @@
     for (const line of told.lines) {
       const path = `svg.chart path.line.${line.style.split(" ").join(".")}`;
       data.push(await values(line));
+      const width = parseFloat(painted(plot, path, "strokeWidth")) || 1.5;
+      const dash = (painted(plot, path, "strokeDasharray").match(/[\d.]+/g) || []).map((d) => d * devicePixelRatio);
       series.push({
-        label: line.label, width: 1.5, stroke: () => painted(plot, path, "stroke"),
+        label: line.label, width, dash, stroke: () => painted(plot, path, "stroke"),
         points: { size: 4, space: 8 }, says: line.label ? `${line.label} ` : "",
       });
     }
