@@ -156,16 +156,11 @@ def shapes(track: Track) -> tuple[list[tuple[str, int]], FloatArray]:
     sizes, bins = np.bincount(track.bin, minlength=count), np.arange(count)
     when = np.bincount(track.bin, track.when, count) / sizes
     before = np.cumsum(sizes) - sizes
-    names: list[tuple[str, int]] = []
-    rows: list[FloatArray] = []
-    for k in range(1, count):
-        if min(before[k], len(track.bin) - before[k]) >= LEAST_SIDE:
-            names.append(("step", k))
-            rows.append((bins >= k).astype(np.float64))
-    for k in range(count - 2):
-        if len(track.bin) - before[k] >= 2 * LEAST_SIDE and when[-1] > when[k]:
-            names.append(("ramp", k))
-            rows.append(np.clip((when - when[k]) / (when[-1] - when[k]), 0.0, 1.0))
+    steps = np.flatnonzero(np.minimum(before, len(track.bin) - before) >= LEAST_SIDE)
+    ramps = np.flatnonzero((bins < count - 2) & (len(track.bin) - before >= 2 * LEAST_SIDE) & (when < when[-1]))
+    names = [("step", int(k)) for k in steps] + [("ramp", int(k)) for k in ramps]
+    rising = (when - when[ramps, None]) / (when[-1] - when[ramps, None])
+    rows = [*(bins >= steps[:, None]).astype(np.float64), *np.clip(rising, 0.0, 1.0)]
     hardest = np.concatenate([[0.0], np.maximum.accumulate(track.shock)[:-1]])
     histories = (("count", np.arange(len(track.bin), dtype=np.float64)), ("worst", hardest))
     for name, history in histories:
