@@ -187,7 +187,7 @@ def test_nothing_to_tell_is_said() -> None:
     found = assess([old])
     assert found.sensors == ()
     assert not found.action
-    assert "1 recordings tell no calibration" in text_table(found)
+    assert "no calibration from 1 recording:" in text_table(found)
     assert document(found)["tests"] == 0
 
 
@@ -211,7 +211,7 @@ def told() -> list[dict[str, Any]]:
 def test_recordings_are_in_the_order_of_dates_else_of_numbers_and_that_is_said(told: list[dict[str, Any]]) -> None:
     dated = read_records(told)
     assert [r.label for r in dated.records] == ["2026-01-01", "2026-02-01"]
-    assert "1 recordings without a date are left out" in dated.notes
+    assert "left out for want of a date: 1 recording" in dated.notes
     bare = [e | {"test": {"number": e["test"]["number"]}} for e in told]
     numbered = read_records(bare)
     assert [r.label for r in numbered.records] == ["T2", "T9", "T10"]

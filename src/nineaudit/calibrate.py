@@ -13,6 +13,7 @@ import typer
 
 from nineaudit.errors import ConfigurationError
 from nineaudit.options import Force, RigOption, example, group
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.calibrating.changes import Keys
@@ -186,7 +187,7 @@ def _written(
         "The uncertainties are those of that day: enlarge gain and zero by what a sensor drifts until the test.",
     ]
     write_text(output, calibrated(rig, changes, notes, output))
-    return [f"{output}: the rig with {len(changes)} of {len(rig.array)} channels calibrated"]
+    return [f"{output}: the rig with {len(changes)} of {counted(len(rig.array), 'channel')} calibrated"]
 
 
 def _require_new(rig: Rig, sheet: Sheet) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 from nineaudit.dbc_text import Fault, faults
 from nineaudit.errors import ConfigurationError
 from nineaudit.signals import suggestion
+from nineaudit.units import counted
 
 EXTENDED = 1 << 31
 """Flag of a 29-bit identifier in a frame's key, as in a DBC file."""
@@ -90,7 +91,7 @@ def read_databases(paths: Sequence[Path]) -> Databases:
 
 def _held(path: Path, content: bytes, database: Any) -> str:
     messages = getattr(database, "messages", [])
-    size = f"{len(messages)} messages, {sum(len(m.signals) for m in messages)} signals"
+    size = f"{counted(len(messages), 'message')}, {counted(sum(len(m.signals) for m in messages), 'signal')}"
     return f"CAN database {path.name}: {size}, SHA-256 {hashlib.sha256(content).hexdigest()}"
 
 

@@ -13,6 +13,7 @@ from nineaudit.collecting import collecting
 from nineaudit.errors import ConfigurationError, NineauditError
 from nineaudit.outcome import Outcome
 from nineaudit.outputs import each_its_own, make_folder, places, protect, unwritable, write_text
+from nineaudit.units import counted
 
 __all__ = [
     "Files", "Outcome", "audit_each", "files", "load_book", "run", "tally", "write_page",
@@ -186,4 +187,4 @@ def _styled(outcome: Outcome, style: str) -> str:
 def tally(verdicts: Mapping[str, int]) -> str:
     """``12 recordings: 2 fail, 1 not audited, 9 pass``."""
     parts = ", ".join(f"{n} {verdict.replace('_', ' ')}" for verdict, n in sorted(verdicts.items()))
-    return f"{sum(verdicts.values())} recordings: {parts}"
+    return f"{counted(sum(verdicts.values()), 'recording')}: {parts}"

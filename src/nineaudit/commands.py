@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from nineaudit.errors import ConfigurationError
 from nineaudit.outputs import require_absent, write_text
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.array import Sensor
@@ -51,7 +52,7 @@ def repaired(
     u = display(done["u_rms"], done["unit"], audit.recording.rig.units, 2)
     return [
         f"{output}: {' and '.join(done['channels'])} {_how(done)}, {done['samples_replaced']} of "
-        f"{done['samples']} samples, standard uncertainty {u}",
+        f"{counted(done['samples'], 'sample')}, standard uncertainty {u}",
         *(f"{output}: not carried over from {lost}" for lost in done["not_carried_over"]),
         f"{made}: what was done, how well, from what, by whom",
     ]
@@ -92,7 +93,7 @@ def written(recording: Recording, output: Path, dbc: Sequence[Path] = (), force:
         said = [f"{database}: its database, to be named with --dbc"]
         dbc = (database,)
     done = write_recording(recording, output, dbc=list(dbc) or None, force=force)
-    size = f"{len(recording.channels)} channels, {len(recording.time)} samples at {recording.rate:g} Hz"
+    size = f"{counted(len(recording.channels), 'channel')}, {len(recording.time)} samples at {recording.rate:g} Hz"
     return [f"{output}: {'; '.join((size, *recording.source.notes, *done.notes))}", *said]
 
 
@@ -138,7 +139,8 @@ def rig_lines(rig: Rig) -> list[str]:
 
     kinds = [sensor.kind for sensor in rig.array.sensors]
     accelerometers, gyroscopes = kinds.count("accelerometer"), kinds.count("gyroscope")
-    out = [f"{rig.name}: {accelerometers} accelerometers, {gyroscopes} rate sensors, filter class {rig.filter_class}"]
+    sensors = f"{counted(accelerometers, 'accelerometer')}, {counted(gyroscopes, 'rate sensor')}"
+    out = [f"{rig.name}: {sensors}, filter class {rig.filter_class}"]
     for sensor in rig.array.sensors:
         place = ", ".join(f"{x / FACTORS['length'][rig.units.length]:.4g}" for x in sensor.position)
         axis = ", ".join(f"{x:.4g}" for x in sensor.axis)

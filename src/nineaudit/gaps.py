@@ -15,6 +15,7 @@ import numpy as np
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.errors import EstimationError
 from nineaudit.recording import Recording
+from nineaudit.units import counted
 
 SHORT: Final = 1e-3
 """Longest gap that a straight line may bridge, s."""
@@ -41,7 +42,7 @@ class Gaps:
             "" if self.stretches == 1 else f" in {self.stretches} stretches, the longest {1e3 * self.longest:.3g} ms"
         )
         return (
-            f"channel {self.channel}: {self.count} of {self.total} samples missing, "
+            f"channel {self.channel}: {self.count} of {counted(self.total, 'sample')} missing, "
             f"{self.start:.5g} to {self.end:.5g} s{parts}"
         )
 

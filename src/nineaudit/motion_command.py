@@ -11,6 +11,7 @@ import typer
 
 from nineaudit.errors import ConfigurationError
 from nineaudit.options import Channels, Dbc, Force, Recording, RigOption, example
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.case import Case
@@ -191,7 +192,7 @@ def _written(
         from nineaudit.motion_files import files_of, write_motion
 
         notes = write_motion(found, output, force)
-        said.append("; ".join([f"{output}: {len(found.time)} samples of every curve, SI units", *notes]))
+        said.append("; ".join([f"{output}: {counted(len(found.time), 'sample')} of every curve, SI units", *notes]))
         said += [f"{database}: its database" for database in files_of(output)[1:]]
     if html is not None:
         from nineaudit.outputs import write_text

@@ -10,6 +10,7 @@ import typer
 
 from nineaudit.errors import ConfigurationError
 from nineaudit.options import Rules, example, group
+from nineaudit.units import counted
 
 T = TypeVar("T")
 
@@ -63,7 +64,7 @@ def rules_check(
     folders = dict.fromkeys(place.parent if place.suffix == ".toml" else place for place in places)
     books = in_turn(folders, checking.load_book)
     return "\n".join(
-        f"{folder}: the sheets are in order; {len(book.rules)} rules with those of nineaudit"
+        f"{folder}: the sheets are in order; {counted(len(book.rules), 'rule')} with those of nineaudit"
         for folder, book in zip(folders, books, strict=True)
     )
 

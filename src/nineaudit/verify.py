@@ -16,6 +16,7 @@ from nineaudit.provenance import SCHEMA as REPAIR
 from nineaudit.provenance import chain, parse, path_beside
 from nineaudit.readers import READERS, fingerprint
 from nineaudit.readers.mcap.rebuilt import record_in
+from nineaudit.units import counted
 
 RESULT: Final = "nineaudit/result/1"
 UNCHANGED, CHANGED, UNKNOWN = 0, 1, 3
@@ -177,7 +178,7 @@ def _log(log: Path) -> Iterator[Answer]:
         said = f"{audit_log.head_of(log).name} is not there: lines that were cut off at the end cannot be seen"
         yield Answer(str(log), UNKNOWN, said)
     elif not wrong:
-        yield Answer(str(log), UNCHANGED, f"{len(lines)} lines, each with the hash of the one before")
+        yield Answer(str(log), UNCHANGED, f"{counted(len(lines), 'line')}, each with the hash of the one before")
     last: dict[str, tuple[Any, object]] = {}
     for entry in lines:
         for stated in [*_tables(entry.get("inputs")), *_tables(entry.get("outputs"))]:

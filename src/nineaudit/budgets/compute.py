@@ -27,6 +27,7 @@ from nineaudit.estimate.rate_smoother import Smoother
 from nineaudit.estimate.trajectory import Fit
 from nineaudit.rig import Rig
 from nineaudit.simulate import simulate
+from nineaudit.units import counted
 
 INSTANTS = 60
 """Instants at which a budget over time is computed."""
@@ -127,7 +128,7 @@ class Budget:
         if not (has_rates(self.array) or spans(self.array)):
             raise EstimationError(
                 "no motion, hence no budget",
-                found=f"{int(self.array.is_accelerometer.sum())} accelerometers that do not span α",
+                found=f"{counted(int(self.array.is_accelerometer.sum()), 'accelerometer')}, α not spanned",
                 expected="six accelerometers of rank 6, or rate sensors on three axes",
             )
 

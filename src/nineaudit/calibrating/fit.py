@@ -16,7 +16,7 @@ import numpy as np
 from nineaudit.array import FloatArray, Kind, Sensor
 from nineaudit.calibrating.sheet import unit_si
 from nineaudit.errors import EstimationError
-from nineaudit.units import FACTORS
+from nineaudit.units import FACTORS, counted
 
 UNIT_SHARE = 0.15
 """How near, as a logarithm, a scale comes to the ratio of two units to be taken for it."""
@@ -171,7 +171,7 @@ def _require_span(sensor: Sensor, inputs: FloatArray, single: bool) -> None:
         raise EstimationError(
             f"the runs do not vary the {what} along {missing}",
             place=f"channel {sensor.channel}",
-            found=f"{count} runs, rank {rank} of {size}, condition number {condition:.3g}",
+            found=f"{counted(count, 'run')}, rank {rank} of {size}, condition number {condition:.3g}",
             expected=f"rank {size}, condition number below {WORST_CONDITION:g}",
             advice=advice,
         )
@@ -179,7 +179,7 @@ def _require_span(sensor: Sensor, inputs: FloatArray, single: bool) -> None:
         raise EstimationError(
             "too few runs to say how good the fit is",
             place=f"channel {sensor.channel}",
-            found=f"{count} runs for {size + 1} unknowns",
+            found=f"{counted(count, 'run')} for {size + 1} unknowns",
             expected=f"{size + 2} or more",
             advice="repeat some of them",
         )

@@ -16,6 +16,7 @@ import numpy as np
 from nineaudit.array import FloatArray, Sensor
 from nineaudit.calibrating.fit import least_squares
 from nineaudit.errors import EstimationError
+from nineaudit.units import counted
 
 LEAST_LEVELS = 3
 BECKER_LEVELS = 10
@@ -54,7 +55,7 @@ def staircase(sensor: Sensor, level: FloatArray, readings: FloatArray) -> PathGa
         raise EstimationError(
             "a staircase of too few levels",
             place=f"channel {sensor.channel}",
-            found=f"{levels} levels in {len(values)} runs, rank {min(levels, 2)} of 2",
+            found=f"{counted(levels, 'level')} in {counted(len(values), 'run')}, rank {min(levels, 2)} of 2",
             expected=f"{LEAST_LEVELS} that differ; {BECKER_LEVELS} show whether the path is straight",
         )
     line = least_squares(steps[:, None], values)

@@ -15,6 +15,7 @@ import numpy as np
 from nineaudit.array import FloatArray, Sensor, SensorArray
 from nineaudit.errors import RecordingError
 from nineaudit.presets import nearest
+from nineaudit.units import counted
 
 _LETTERS: Final = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _DIRECTION: Final = "+x, -y, ... or three numbers with spaces between them"
@@ -54,7 +55,9 @@ def read_sheet(path: Path) -> Sheet:
     kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     cells = [tuple(cell.strip() for cell in row) for row in csv.reader(line for _, line in kept)]
     if len(cells) < 2:
-        raise RecordingError("no runs", file=path, found=f"{len(cells)} lines", expected="a header and one row a run")
+        raise RecordingError(
+            "no runs", file=path, found=counted(len(cells), "line"), expected="a header and one row a run"
+        )
     names = cells[0]
     for (line, _), row in zip(kept, cells, strict=True):
         if len(row) != len(names):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from nineaudit.calibrating.fit import Calibration, student
 from nineaudit.calibrating.path import BECKER_LEVELS, PathGain
+from nineaudit.units import counted
 
 
 def sensors(found: Sequence[Calibration], confidence: float) -> list[str]:
@@ -31,7 +32,9 @@ def paths(found: Sequence[PathGain], confidence: float) -> list[str]:
     head = ("channel", "gain", "±", "offset", "±", "unit", "rms", "max", "linearity %", "levels", "runs")
     rows = [_path(p, student(p.dof, confidence)) for p in found]
     fewest = min(p.levels for p in found)
-    few = [f"{fewest} levels: Becker and Willems 1975 take {BECKER_LEVELS}"] if fewest < BECKER_LEVELS else []
+    few = (
+        [f"{counted(fewest, 'level')}: Becker and Willems 1975 take {BECKER_LEVELS}"] if fewest < BECKER_LEVELS else []
+    )
     return [f"limits: {100 * confidence:g} % confidence, of the fit alone", *_aligned([head, *rows]), *few]
 
 

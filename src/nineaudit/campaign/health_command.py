@@ -16,6 +16,7 @@ from nineaudit.campaign.commands import campaign_app
 from nineaudit.campaign.table_commands import Edition, Ended, LakeOption
 from nineaudit.errors import ConfigurationError
 from nineaudit.options import Force, example
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.calibrating.changes import Keys
@@ -91,7 +92,11 @@ def rig(
     notes = _notes(changes, told, found, stated, about)
     write_text(output, calibrated(stated, changes, notes, output))
     write_text(beside, to_json(evidence(told, changes, found, stated, about)))
-    return [*notes, f"{output}: the rig with {len(changes)} of {len(stated.array)} channels improved", str(beside)], 0
+    return [
+        *notes,
+        f"{output}: the rig with {len(changes)} of {counted(len(stated.array), 'channel')} improved",
+        str(beside),
+    ], 0
 
 
 def _notes(
@@ -104,12 +109,12 @@ def _notes(
     dates = sorted({d for m in health.sensors for d in (m.first, m.last) if d})
     lines = [
         f"Improved by nineaudit campaign rig from lake {about['name']}, edition {about['edition']}, "
-        f"{health.tests} tests, {dates[0]} to {dates[-1]},",
+        f"{counted(health.tests, 'test')}, {dates[0]} to {dates[-1]},",
         f"in {rig.path.name if rig.path else rig.name}, SHA-256 {rig.sha256}. Errors that they found, ± at k = 2:",
     ]
     for one in (one for one in told if one.channel in changes):
         said = [f"{p} {amount(p, one.value[p], 2.0 * one.told[p])}" for p in one.value if one.significant(p)]
-        lines.append(f"{one.channel} (sensor {one.sensor}, {one.tests} tests): {', '.join(said)}")
+        lines.append(f"{one.channel} (sensor {one.sensor}, {counted(one.tests, 'test')}): {', '.join(said)}")
     left = [one.channel for one in told if one.undecided]
     if left:
         lines.append(f"left as they were, for a change that may be another's: {', '.join(left)}")

@@ -15,6 +15,7 @@ import typer
 
 from nineaudit.campaign.commands import campaign_app
 from nineaudit.options import example
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.campaign.compact import Compaction
@@ -50,7 +51,7 @@ def _compacted(done: Compaction) -> Ended:
 
     wrong = [f"{printable(one.place)}: left out: {printable(one.why)}" for one in done.damaged]
     left = f"; {len(wrong)} left out" if wrong else ""
-    said = f"{done.recordings} recordings of edition {done.edition}{left}: tables {', '.join(schema.TABLES)}"
+    said = f"{counted(done.recordings, 'recording')} of edition {done.edition}{left}: tables {', '.join(schema.TABLES)}"
     return [*wrong, said], DAMAGED if wrong else 0
 
 
@@ -82,7 +83,7 @@ def query(
         answers.write_parquet(answer, output)
     else:
         write_text(output, answers.as_text(answer, style) + "\n")
-    return [f"{output}: {answer.num_rows} rows"], 0
+    return [f"{output}: {counted(answer.num_rows, 'row')}"], 0
 
 
 @campaign_app.command(

@@ -6,13 +6,16 @@ from nineaudit.case import Case
 from nineaudit.estimate.at_their_word import spans
 from nineaudit.estimate.motion import has_rates
 from nineaudit.finding import Measure, NotApplicable
+from nineaudit.units import counted
 
 
 def alpha_uncertainty(case: Case, *, part_of_peak: float) -> Measure | NotApplicable:
     """UB401: expanded uncertainty (k = 2) of the peak of α, as a part of it, as `nineaudit budget` has it."""
     if not (has_rates(case.array) or spans(case.array)):
         count = int(case.array.is_accelerometer.sum())
-        return NotApplicable(f"{count} accelerometers do not span α, and no rate sensors on three axes give it")
+        return NotApplicable(
+            f"α is not spanned by {counted(count, 'accelerometer')}, and no rate sensors on three axes give it"
+        )
     found = case.alpha_budget
     largest = max(found.rows, key=lambda source: found.rows[source])
     time = float(case.condensed.time[found.row])

@@ -17,6 +17,7 @@ from nineaudit.estimate.search import FEW_CHANNELS
 from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.finding import COVERAGE_FACTOR, Measure, NotApplicable
 from nineaudit.physics import nap
+from nineaudit.units import counted
 
 COARSE = 5.0
 """Second differences over the noise above which knocks pass between the samples: no single one proves a fault."""
@@ -139,9 +140,7 @@ def _unresolved(case: Case) -> float:
 
 
 def _nothing_to_spare(case: Case) -> str:
-    return (
-        f"the {len(case.array)} channels have no redundancy: rigid-body constraints cannot show a fault in any of them"
-    )
+    return f"no redundancy in {counted(len(case.array), 'channel')}: rigid-body constraints can show no fault in any"
 
 
 CHECKS = {"RB301": constraint_equations, "RB302": array_parity, "RB303": whole_record}

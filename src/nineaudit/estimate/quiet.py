@@ -8,6 +8,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError
+from nineaudit.units import counted
 
 SHORTEST = 16
 """Fewest samples of a quiet interval: a mean to a quarter of the noise, a standard deviation to 18 %."""
@@ -51,7 +52,7 @@ def find_quiet(
         stop = int(np.searchsorted(time, stated[1], side="right"))
         if stop - start < SHORTEST:
             raise ConfigurationError(
-                f"the interval holds {stop - start} samples",
+                f"the interval holds {counted(stop - start, 'sample')}",
                 place="[recording] pre_trigger",
                 found=list(stated),
                 expected=f"at least {SHORTEST} samples between {time[0]:.6g} s and {time[-1]:.6g} s",

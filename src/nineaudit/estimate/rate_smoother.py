@@ -20,6 +20,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
+from nineaudit.units import counted
 
 ORDER = 3
 _DIFFERENCE = np.array([-1.0, 3.0, -3.0, 1.0])
@@ -66,7 +67,7 @@ def smoother(rates: FloatArray, sigma: FloatArray) -> Smoother:
     """
     if len(rates) < 4 * ORDER:
         raise EstimationError(
-            "too short to smooth the rates", found=f"{len(rates)} samples", expected=f"at least {4 * ORDER}"
+            "too short to smooth the rates", found=counted(len(rates), "sample"), expected=f"at least {4 * ORDER}"
         )
     differences = np.diff(rates, ORDER, axis=0)
     tau = [_likeliest(d, float(s)) for d, s in zip(differences.T, sigma, strict=True)]

@@ -13,6 +13,7 @@ from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate.motion import Motion, bridge, rates_omega, with_accelerations
 from nineaudit.estimate.rate_smoother import noise_of_rates, smoother
+from nineaudit.units import counted
 
 METHOD = "whole-record smoother of the rates, α their slope"
 
@@ -27,7 +28,7 @@ def smoothed_rates(array: SensorArray, time: FloatArray, readings: FloatArray, s
     if rank < 3:
         raise EstimationError(
             "the acceleration of the origin is not known",
-            found=f"{int(held.sum())} accelerometers, axes of rank {rank}",
+            found=f"{counted(int(held.sum()), 'accelerometer')}, axes of rank {rank}",
             expected="rank 3",
             advice="add accelerometers along the axes that have none",
         )

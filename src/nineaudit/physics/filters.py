@@ -19,6 +19,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError, EstimationError
+from nineaudit.units import counted
 
 Standard = Literal["J211", "ISO6487"]
 _DESIGN_FACTOR: Final[dict[str, float]] = {"J211": 2.0775, "ISO6487": 1.25 * 5.0 / 3.0}
@@ -131,7 +132,7 @@ def cfc(values: FloatArray, rate: float, class_: float, standard: Standard = "J2
     if len(values) < 2 or not np.isfinite(values).all():
         raise EstimationError(
             "signal cannot be filtered",
-            found=f"{len(values)} samples, {np.count_nonzero(~np.isfinite(values))} values not finite",
+            found=f"{counted(len(values), 'sample')}, {np.count_nonzero(~np.isfinite(values))} of them not finite",
             expected="at least 2 samples, all finite",
             advice="repair or cut the gap first",
         )

@@ -19,6 +19,7 @@ import numpy as np
 
 from nineaudit.array import BoolArray, FloatArray
 from nineaudit.errors import EstimationError
+from nineaudit.units import counted
 
 _RANK_TOLERANCE = 1e-10
 """Singular values below this share of the largest count as zero; columns are scaled to like size first."""
@@ -90,7 +91,7 @@ def product_free_alpha(positions: FloatArray, axes: FloatArray, leak: float = 1e
     if len(axes) < 6 or _rank(h) < 6:
         raise EstimationError(
             "angular acceleration is not determined",
-            found=f"{len(axes)} accelerometers, H of rank {_rank(h) if len(axes) else 0}",
+            found=f"{counted(len(axes), 'accelerometer')}, H of rank {_rank(h) if len(axes) else 0}",
             expected="rank 6",
         )
     rows, spare = np.linalg.pinv(h)[3:], parity(h)
@@ -99,7 +100,7 @@ def product_free_alpha(positions: FloatArray, axes: FloatArray, leak: float = 1e
     if left > leak:
         raise EstimationError(
             "no angular acceleration free of products of angular velocity",
-            found=f"{len(axes)} accelerometers, [H Q] of rank {_rank(np.hstack([h, q]))}, leak {left:.2g}",
+            found=f"{counted(len(axes), 'accelerometer')}, [H Q] of rank {_rank(np.hstack([h, q]))}, leak {left:.2g}",
             expected="rows in which α is separate from the products, as in a 3-2-2-2 array",
         )
     return np.asarray(rows / length)

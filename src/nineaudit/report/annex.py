@@ -187,7 +187,9 @@ def _identifier(x: Identifier) -> Row:
     wrong = [f"{c.signal}: {c.missing} numbers missing" for c in x.counters if c.missing]
     wrong += [f"{c.signal}: {c.repeated} numbers repeated" for c in x.counters if c.repeated]
     wrong += [f"{c.signal}: {c.wrong} checksums wrong" for c in x.checksums if c.wrong]
-    wrong += [f"{o.signal}: {o.count} values outside {o.low:g} to {o.high:g} {o.unit}".rstrip() for o in x.outside]
+    wrong += [
+        f"{o.signal}: {counted(o.count, 'value')} outside {o.low:g} to {o.high:g} {o.unit}".rstrip() for o in x.outside
+    ]
     wrong += [f"{signal}: {counted(frames, 'time')} not available" for signal, frames in x.unavailable]
     wrong += [f"{counted(n, 'frame')} {word} than the database has them" for n, word in _lengths(x) if n]
     wrong += ["no byte ever changes"] if x.constant and x.frames > 1 else []

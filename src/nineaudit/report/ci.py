@@ -14,6 +14,7 @@ from nineaudit.finding import Finding, Severity, Verdict
 from nineaudit.report.findings import NOTABLE, by_family, by_weight, channels, family_title
 from nineaudit.report.numbers import printable
 from nineaudit.report.text import diagnosis_sentence, finding_line, listed
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -218,7 +219,7 @@ def _within(head: list[str], rows: list[str], tail: list[str]) -> str:
     kept, used = 0, 0
     while kept < len(rows) and (used := used + len(rows[kept].encode()) + 1) <= room:
         kept += 1
-    more = [] if kept == len(rows) else ["", f"{len(rows) - kept} more recordings are not shown."]
+    more = [] if kept == len(rows) else ["", f"Not shown: {counted(len(rows) - kept, 'more recording')}."]
     return "\n".join(head + rows[:kept] + more + tail) + "\n"
 
 
@@ -233,4 +234,4 @@ def _cell(text: str) -> str:
 def _short(text: str) -> str:
     """At most `LONGEST` characters; what is left out is counted."""
     left_out = len(text) - LONGEST
-    return text if left_out <= 0 else f"{text[:LONGEST]}… ({left_out} more characters)"
+    return text if left_out <= 0 else f"{text[:LONGEST]}… ({counted(left_out, 'more character')})"

@@ -14,6 +14,7 @@ from nineaudit.report.numbers import digits, edge, spelled
 from nineaudit.report.page import ZOOMS, script, template
 from nineaudit.report.scheme_styles import classes, css, groups
 from nineaudit.report.zoom import store, zoomable
+from nineaudit.units import counted
 
 HEADERS = (
     "scheme", "curve", "unit", "r", "r 2.5 ms", "ISO 18571", "grade", "peak", "difference", "U", "ratio", "budget",
@@ -54,9 +55,9 @@ def _heading(comparison: Comparison, recording: Recording) -> str:
     beyond = sum(not row.explained for row in comparison.rows)
     verdict = f"{beyond} of {len(comparison.rows)} differences exceed" if beyond else "every difference is within"
     return (
-        f"{recording.source.path}: {len(comparison.curves)} schemes, against {comparison.reference} "
+        f"{recording.source.path}: {counted(len(comparison.curves), 'scheme')}, against {comparison.reference} "
         f"({comparison.methods[comparison.reference]}); {verdict} {EXPLAINED:g} times what the rig's uncertainties "
-        f"explain ({comparison.draws} draws of the instrument; "
+        f"explain ({counted(comparison.draws, 'draw')} of the instrument; "
         f"{comparison.filter})"
     )
 

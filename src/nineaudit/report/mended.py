@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.report.text import fault_word, joined
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -32,7 +33,10 @@ def words(new: Reconstruction) -> dict[str, Any]:
 
 def done(new: Reconstruction) -> str:
     """What was done, as the beginning of a sentence."""
-    channels, size = joined(new.channels), f"{int(new.replaced.any(axis=1).sum())} of {len(new.replaced)} samples"
+    channels, size = (
+        joined(new.channels),
+        f"{int(new.replaced.any(axis=1).sum())} of {counted(len(new.replaced), 'sample')}",
+    )
     if new.fault is None:
         return f"{channels} was rebuilt from the other channels at {size}"
     if new.fault == "swap":

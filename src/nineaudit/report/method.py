@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from nineaudit.report import mended
 from nineaudit.report.numbers import NO_BREAK, digits, quantity, seconds, sensor_edge
+from nineaudit.units import counted
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -40,7 +41,9 @@ def _recording(audit: Audit) -> str:
     recording = audit.recording
     kinds = [sensor.kind for sensor in recording.rig.array.sensors]
     rates = kinds.count("gyroscope")
-    sensors = f"{kinds.count('accelerometer')} accelerometers" + (f" and {rates} rate sensors" if rates else "")
+    sensors = f"{kinds.count('accelerometer')} accelerometers" + (
+        f" and {counted(rates, 'rate sensor')}" if rates else ""
+    )
     return (
         f"The recording {recording.source.path.name} (SHA-256 {recording.source.sha256}), {sensors} of the rig "
         f"“{recording.rig.name}”, {len(recording.time)} samples at {quantity(recording.rate, 'Hz', 5)}, filter class "
@@ -58,7 +61,7 @@ def _zero(audit: Audit) -> str:
 
 def _rules(audit: Audit) -> str:
     return (
-        f"The recording was held against {len(audit.rulebook.rules)} rules (SHA-256 of the rules "
+        f"The recording was held against {counted(len(audit.rulebook.rules), 'rule')} (SHA-256 of the rules "
         f"{audit.rulebook.sha256}). A value conforms below its limit less the expanded uncertainty U (k = 2), fails "
         "above the limit plus U, and is inconclusive between them (JCGM 106, guard band on both sides)."
     )

@@ -26,6 +26,7 @@ from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate.motion import Motion, bridge, has_rates, rates_omega
 from nineaudit.physics import kinematics
+from nineaudit.units import counted
 
 WINDOW: Final = 2.5e-3
 """Window of the moving correlation, s [Martin98]."""
@@ -198,7 +199,7 @@ def moving_correlation(first: FloatArray, second: FloatArray, rate: float, windo
     if count < 3 or count > len(first) or first.shape != second.shape:
         raise EstimationError(
             "curves cannot be correlated in the window",
-            found=f"{len(first)} and {len(second)} samples, {count} in the window of {window:g} s",
+            found=f"{len(first)} and {counted(len(second), 'sample')}, {count} in the window of {window:g} s",
             expected="equal lengths, 3 samples in the window or more, and no more than there are",
         )
     x, y = (np.lib.stride_tricks.sliding_window_view(v, count) for v in (first, second))

@@ -26,6 +26,7 @@ from nineaudit.array import FloatArray, SensorArray
 from nineaudit.errors import EstimationError
 from nineaudit.estimate.motion import Motion, bridge
 from nineaudit.physics import rigid_body
+from nineaudit.units import counted
 
 LARGEST_CONDITION: Final = 1e6
 """Of H, lengths in units of the array's size: beyond, a part in a million of geometry decides over α."""
@@ -61,7 +62,7 @@ def solver(positions: FloatArray, axes: FloatArray, covariance: FloatArray | Non
         condition = "infinite" if least <= 1e-12 * singular[0] else f"{singular[0] / least:.2g}"
         raise EstimationError(
             "angular acceleration is not determined by the accelerometers",
-            found=f"{len(axes)} channels, H of rank {rank}, condition number {condition}",
+            found=f"{counted(len(axes), 'channel')}, H of rank {rank}, condition number {condition}",
             expected=f"rank 6, condition number below {LARGEST_CONDITION:.0e}",
             advice="triaxes on one line do not see the turning about it: move one of them off the line",
         )

@@ -14,6 +14,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError, EstimationError
+from nineaudit.units import counted
 
 NATURAL_HZ = 37.0
 DAMPING = 0.5
@@ -47,8 +48,8 @@ def second_order(
     if step <= 0.0 or np.abs(steps - step).max() > _UNEVEN * step or not np.isfinite(values).all():
         raise EstimationError(
             "not to be put through an instrument's response",
-            found=f"{np.count_nonzero(~np.isfinite(values))} gaps, steps {steps.min(initial=0.0):.3g} s to "
-            f"{steps.max(initial=0.0):.3g} s",
+            found=f"{counted(int(np.count_nonzero(~np.isfinite(values))), 'gap')}, steps "
+            f"{steps.min(initial=0.0):.3g} s to {steps.max(initial=0.0):.3g} s",
             expected="finite values on an even time base",
         )
     natural = 2.0 * math.pi * natural_hz

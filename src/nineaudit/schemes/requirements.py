@@ -11,6 +11,7 @@ from nineaudit.errors import EstimationError
 from nineaudit.estimate import parity
 from nineaudit.estimate.motion import has_rates
 from nineaudit.physics import rigid_body
+from nineaudit.units import counted
 
 LARGEST: Final = 1e9
 """SI: a hundred million g, beyond what any sensor reads, and far from where squares overflow."""
@@ -34,7 +35,7 @@ def require_alpha(array: SensorArray) -> None:
     more = "six accelerometers or more, not all along one axis nor at points on one line, tell α"
     raise EstimationError(
         "the accelerometers do not tell α, and the fit leaves it to differences of ω",
-        found=f"{len(axes)} accelerometers, H of rank {rank}, condition number {condition}",
+        found=f"{counted(len(axes), 'accelerometer')}, H of rank {rank}, condition number {condition}",
         expected="rank 6",
         advice=f"use --method rates; {more}" if has_rates(array) else f"{more}: add some, or move one",
     )
@@ -47,7 +48,7 @@ def require_acceleration(array: SensorArray) -> None:
     if rank < 3:
         raise EstimationError(
             "no accelerometers on three axes: accelerations, velocities and paths are not known",
-            found=f"{len(axes)} accelerometers, axes of rank {rank}",
+            found=f"{counted(len(axes), 'accelerometer')}, axes of rank {rank}",
             expected="rank 3",
             advice="add accelerometers along the axes that have none",
         )

@@ -29,6 +29,7 @@ from nineaudit.errors import EstimationError
 from nineaudit.estimate.motion import Motion, bridge
 from nineaudit.physics import kinematics
 from nineaudit.schemes.martin import gyro_omega
+from nineaudit.units import counted
 
 SAMPLES_PER_CYCLE: Final = 10.0
 """Samples a cycle of the highest harmonic that carries the signal: SAE J211 asks for ten times the class."""
@@ -134,7 +135,9 @@ def simpson_integral(values: FloatArray, time: FloatArray, initial: FloatArray |
     from scipy.integrate import cumulative_simpson
 
     if len(time) < 3 or not (np.diff(time) > 0.0).all():
-        raise EstimationError("time base is not increasing", found=f"{len(time)} samples", expected="three or more")
+        raise EstimationError(
+            "time base is not increasing", found=counted(len(time), "sample"), expected="three or more"
+        )
     start = np.zeros_like(np.asarray(values)[:1])
     return np.asarray(initial + cumulative_simpson(values, x=time, axis=0, initial=start))
 
@@ -150,7 +153,7 @@ def newton_cotes_integral(values: FloatArray, step: float, order: int) -> float:
     if spare or panels < 1:
         raise EstimationError(
             "record is not a whole number of panels",
-            found=f"{len(values) - 1} intervals",
+            found=counted(len(values) - 1, "interval"),
             expected=f"a multiple of {order}",
         )
     weights = np.asarray(newton_cotes(order, equal=1)[0])

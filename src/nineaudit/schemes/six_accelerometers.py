@@ -22,6 +22,7 @@ import numpy as np
 from nineaudit.array import FloatArray, SensorArray, frozen
 from nineaudit.errors import EstimationError
 from nineaudit.physics import rigid_body
+from nineaudit.units import counted
 
 CHANNELS = 6
 WORST_CONDITION = 1e6
@@ -61,7 +62,7 @@ def package(array: SensorArray) -> Package:
     if len(chosen) != CHANNELS:
         raise EstimationError(
             "not an array of six accelerometers",
-            found=f"{len(chosen)} accelerometers",
+            found=counted(len(chosen), "accelerometer"),
             expected="6, as in the preset 3-2-1",
         )
     return Package(chosen.positions, chosen.axes, np.zeros(CHANNELS))
@@ -163,7 +164,7 @@ def _require(outputs: FloatArray, time: FloatArray) -> None:
         raise EstimationError(
             "readings have gaps",
             place=f"channels {', '.join(str(b + 1) for b in bad)} of {CHANNELS}",
-            found=f"{np.count_nonzero(~np.isfinite(outputs))} values that are no number",
+            found=f"{counted(int(np.count_nonzero(~np.isfinite(outputs))), 'value')} that are no number",
             advice="six channels have no redundancy to fill them: cut the record before the gap",
         )
     if not (np.isfinite(time).all() and np.all(np.diff(time) > 0.0)):

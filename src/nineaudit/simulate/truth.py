@@ -11,7 +11,7 @@ import numpy as np
 from nineaudit.array import FloatArray, frozen
 from nineaudit.errors import ConfigurationError
 from nineaudit.physics.kinematics import orientation
-from nineaudit.units import G0
+from nineaudit.units import G0, counted
 
 REST_S = 0.025
 """Rest before every event, s: the example rig's pre_trigger begins 20 ms before it (INTERFACE.md)."""
@@ -50,7 +50,7 @@ def timeline(rate_hz: float, duration_s: float, rest_s: float) -> FloatArray:
     before, after = math.ceil(rest_s * rate_hz - 1e-9), round(duration_s * rate_hz)
     if before + after < 4:
         raise ConfigurationError(
-            f"{before + after + 1} samples are no recording",
+            f"no recording has {counted(before + after + 1, 'sample')}",
             place="rate_hz, duration_s",
             found=[rate_hz, duration_s],
             expected="at least 4 sampling intervals",

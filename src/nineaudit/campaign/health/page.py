@@ -12,6 +12,7 @@ from nineaudit.campaign.health.assess import Health, Member, State
 from nineaudit.campaign.health.words import amount, called, sentence, summary
 from nineaudit.campaign.index_page import Section
 from nineaudit.report.chart import Band, Chart, Level, Line
+from nineaudit.units import counted
 
 CHARTS: Final = 12
 """Sensors with a chart of their own: the worst."""
@@ -54,7 +55,11 @@ def page_rows(health: Health) -> list[tuple[str, ...]]:
 
 def _left_out(health: Health) -> list[str]:
     more = len(health.sensors) - ROWS
-    return [f"{more} more sensors are in control: `nineaudit campaign health` lists them"] if more > 0 else []
+    return (
+        [f"In control, and listed by `nineaudit campaign health` only: {counted(more, 'more sensor')}"]
+        if more > 0
+        else []
+    )
 
 
 def _control(number: int, member: Member, health: Health) -> Chart:
@@ -68,7 +73,7 @@ def _control(number: int, member: Member, health: Health) -> Chart:
     return Chart(
         key=f"sensor-{number}",
         title=f"Gain of {called(member)}, test by test",
-        description=f"{member.tests} tests, {member.first} to {member.last}: {member.state}",
+        description=f"{counted(member.tests, 'test')}, {member.first} to {member.last}: {member.state}",
         time=when,
         unit="%",
         lines=(Line(value, "measured", "what each test says by itself"), Line(fitted, "rebuilt", "all tests together")),
@@ -94,7 +99,7 @@ def _strip(health: Health) -> Chart:
     return Chart(
         key="sensor-strip",
         title="Gain of every sensor now",
-        description=f"{len(members)} sensors by name",
+        description=f"{counted(len(members), 'sensor')} by name",
         time=place if len(place) > 1 else np.array([0.0, 1.0]),
         unit="%",
         lines=(

@@ -22,6 +22,7 @@ import numpy as np
 from nineaudit.array import FloatArray
 from nineaudit.estimate.calibration import perpendicular
 from nineaudit.report.sensors import unpacked
+from nineaudit.units import counted
 
 UNIT: Final = {"gain": 0.005, "tilt": 0.01, "position": 5e-4}
 """What errors are counted in here: relative, rad, m."""
@@ -107,11 +108,11 @@ def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
             kept.append((known, entry["uri"], entry["result"]["rig"]["name"], block))
         else:
             why[block.get("fit") or "audited by a version that did not say it, or not audited"] += 1
-    notes = [f"{count} recordings tell no calibration: {reason}" for reason, count in sorted(why.items())]
+    notes = [f"no calibration from {counted(count, 'recording')}: {reason}" for reason, count in sorted(why.items())]
     days = [_day(known.get("date")) for known, *_ in kept]
     dated = 2 * sum(d is not None for d in days) > len(days)
     if dated and None in days:
-        notes.append(f"{days.count(None)} recordings without a date are left out")
+        notes.append(f"left out for want of a date: {counted(days.count(None), 'recording')}")
     if not dated and kept:
         notes.append("most recordings have no date: they are in the order of their test numbers, else of their names")
     order = sorted(

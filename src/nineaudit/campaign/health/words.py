@@ -10,6 +10,7 @@ from nineaudit.campaign.health.assess import Health, Member, State
 from nineaudit.campaign.health.deviations import Deviation, seat_name
 from nineaudit.campaign.health.records import family
 from nineaudit.report.numbers import plain, printable
+from nineaudit.units import counted
 
 SCHEMA: Final = "nineaudit/sensor-health/1"
 _NAMES: Final = {
@@ -97,7 +98,7 @@ def summary(health: Health) -> list[str]:
 def _counted(health: Health) -> str:
     counts = {state: sum(m.state is state for m in health.sensors) for state in State}
     said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
-    return f"{len(health.sensors)} sensors in {health.tests} tests: {said or 'nothing to tell'}"
+    return f"{counted(len(health.sensors), 'sensor')} in {counted(health.tests, 'test')}: {said or 'nothing to tell'}"
 
 
 def document(health: Health) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from nineaudit.readers.can.blf_objects import TYPES
 from nineaudit.readers.can.blf_stream import Stream
 from nineaudit.readers.can.frames import Frames
 from nineaudit.readers.can.losses import Losses
+from nineaudit.units import counted
 
 _RESTORE_POINT = 115
 """Objects that some writers do not count."""
@@ -68,7 +69,7 @@ def _check_header(header: Header, size: int, account: Account) -> None:
     """What the header states against what is there: a log that was not closed states nothing, or too little."""
     losses, objects = account.losses, sum(account.types.values())
     if header.file_size > size:
-        losses.add(f"the file has {size} of the {header.file_size} bytes its header states", f"byte {size}")
+        losses.add(f"the file has {size} of the {counted(header.file_size, 'byte')} its header states", f"byte {size}")
     if header.objects > objects:
         losses.add(f"{objects} of the {header.objects} objects that the header counts are there", "byte 32")
     if header.start is None:
@@ -78,9 +79,10 @@ def _check_header(header: Header, size: int, account: Account) -> None:
 def _notes(header: Header, size: int, account: Account) -> Iterator[str]:
     there = sum(account.types.values())
     if header.objects < there - account.types[_RESTORE_POINT]:
-        yield f"the header counts {header.objects} objects, {there} are there: the log was not closed, or appended to"
+        objects = counted(header.objects, "object")
+        yield f"the header counts {objects}, {there} are there: the log was not closed, or appended to"
     if header.file_size < size:
-        yield f"the header states {header.file_size} bytes, the file has {size}"
+        yield f"the header states {counted(header.file_size, 'byte')}, the file has {size}"
     for what, count in sorted(account.odd.items()):
         if count:
             yield f"{count} {what}"

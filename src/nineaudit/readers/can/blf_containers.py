@@ -20,6 +20,7 @@ from nineaudit.errors import RecordingError
 from nineaudit.readers.can.blf_chain import BASE, LARGEST, PADDING, ROOM, follow
 from nineaudit.readers.can.blf_inflate import Item, Piece, Window, opened, stated_size
 from nineaudit.readers.can.losses import Losses
+from nineaudit.units import counted
 
 # signature, header size, (application and versions), file size, inflated size, objects, (objects read), start of the
 # measurement as year, month, weekday, day, hour, minute, second, millisecond, (its end), after python-can's blf.py
@@ -101,7 +102,7 @@ def _begin(file: BinaryIO, header: Header, losses: Losses) -> int:
     file.seek(_FILE.size)
     first = file.read(WINDOW).find(b"LOBJ")
     if first >= 0 or (ahead and header.size < _FILE.size):
-        losses.add(f"the header states {header.size} bytes for itself, and no object begins there", "byte 4")
+        losses.add(f"the header states {counted(header.size, 'byte')} for itself, and no object begins there", "byte 4")
         return _FILE.size + max(first, 0)
     return header.size
 

@@ -25,6 +25,7 @@ import numpy as np
 from nineaudit.array import FloatArray
 from nineaudit.readers.tables.dialect import number
 from nineaudit.recording import Damage
+from nineaudit.units import counted
 
 HEADER: Final = 64 * 2**10
 """Bytes of a channel file among which its header must be."""
@@ -156,7 +157,7 @@ def _miscounted(channel: Channel, found: int) -> list[Damage]:
     stated = channel.number("number of samples")
     if np.isnan(stated) or stated == found:
         return []
-    what = f"{found} samples for the {stated:.0f} that its header states"
+    what = f"{counted(found, 'sample')} for the {stated:.0f} that its header states"
     return [Damage(what, channel.short, lost="the rest is missing" if found < stated else "all of them are read")]
 
 

@@ -20,6 +20,7 @@ from typing import BinaryIO, Final
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import cut_short
 from nineaudit.recording import Damage
+from nineaudit.units import counted
 
 LARGEST: Final = 128 * 2**20
 """Bytes of a channel that are read."""
@@ -105,7 +106,9 @@ def _archive(path: Path) -> Store:
             data, fault = _unpacked(file, infos[name], most)
         if not fault:
             return data, _too_large(name, most, infos[name].file_size)
-        return data, (Damage(f"a file of the archive is damaged: {fault}", name, lost=f"{len(data)} bytes are read"),)
+        return data, (
+            Damage(f"a file of the archive is damaged: {fault}", name, lost=f"all after {counted(len(data), 'byte')}"),
+        )
 
     return Store(tuple(name for name in infos if name and not name.endswith("/")), read, damage)
 
@@ -120,7 +123,7 @@ def _directory(path: Path) -> tuple[dict[str, zipfile.ZipInfo], tuple[Damage, ..
         what = f"the directory of the archive cannot be read ({error})"
         if not infos:
             raise cut_short(path, what, "no file") from error
-    return infos, (Damage(what, path.name, lost=f"{len(infos)} files are found without it"),)
+    return infos, (Damage(what, path.name, lost=f"without it, {counted(len(infos), 'file')} found"),)
 
 
 # PKWARE APPNOTE 4.3.7, local file header: signature, version, flags, method, time, date, CRC-32, packed size, size,
@@ -165,7 +168,7 @@ def _unpacked(file: BinaryIO, info: zipfile.ZipInfo, most: int) -> tuple[bytes, 
     if fault or len(data) == most or info.file_size < 0:
         return data, fault
     if len(data) != info.file_size:
-        return data, f"{len(data)} bytes for the {info.file_size} stated"
+        return data, f"{counted(len(data), 'byte')} for the {info.file_size} stated"
     return data, "" if zlib.crc32(data) == info.CRC else "its checksum (CRC-32) is wrong"
 
 

@@ -22,7 +22,7 @@ from nineaudit.readers.mme.files import LARGEST, Test, open_test
 from nineaudit.readers.mme.header import statements
 from nineaudit.recording import Damage, Trace
 from nineaudit.signals import suggestion
-from nineaudit.units import factor
+from nineaudit.units import counted, factor
 
 if TYPE_CHECKING:
     from nineaudit.rig import Rig
@@ -170,7 +170,7 @@ def _explicit(
     time, _, more = mme_channel.samples(clock, data)
     if time.size != count:
         lost = "what has no partner is left out"
-        more.append(Damage(f"{count} samples for {time.size} times of {clock.short}", head.short, lost=lost))
+        more.append(Damage(f"{counted(count, 'sample')} for {time.size} times of {clock.short}", head.short, lost=lost))
     place = f"the unit of {clock.short}"
     return time * factor(clock.get("unit") or "s", "time", place=place), (*damage, *more)
 

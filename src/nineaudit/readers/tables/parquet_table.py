@@ -68,7 +68,7 @@ def _groups(file: Any, wanted: Sequence[str]) -> tuple[list[Any], list[Damage]]:
         size = file.metadata.row_group(index).total_byte_size
         try:
             if not 0 <= size <= LARGEST:
-                raise pa.ArrowInvalid(f"{size} bytes when unpacked")
+                raise pa.ArrowInvalid(f"{counted(size, 'byte')} when unpacked")
             groups.append(file.read_row_group(index, columns=wanted, use_threads=False))
         except (pa.ArrowException, OSError) as error:
             lost.append((index, _said(error)))
