@@ -12,8 +12,10 @@ from tempfile import TemporaryDirectory
 from xml.etree import ElementTree as ET
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from nineaudit.auditing import Audit, audit
+from nineaudit.checking import audit_each, load_book
 from nineaudit.errors import ConfigurationError
 from nineaudit.identity import KEYS, Identity, Stated, from_options, identify, is_date, moment, stated
 from nineaudit.readers import read
@@ -312,6 +314,22 @@ def render_result_of(done: Audit) -> str:
         path = Path(folder) / "result.json"
         path.write_text(to_json(result_document(done)))
         return render_result(path)
+
+
+def test_what_could_not_be_audited_has_what_rig_and_options_state(tmp_path: Path) -> None:
+    (tmp_path / "T1.csv").write_bytes(b"")
+    rig = parse_rig(RIG + '[test]\ncustomer = "C. Example"\n')
+    outcome = next(iter(audit_each([tmp_path / "T1.csv"], rig, load_book(), test=from_options(["number=T7"]))))
+    document = outcome.document()
+    assert document["verdict"] == "not_audited"
+    assert document["test"] == {
+        "number": "T7",
+        "customer": "C. Example",
+        "sources": {"number": "option --test", "customer": rig.test[0].source},
+    }
+    Draft202012Validator(result_schema()).validate(document)
+    bare = next(iter(audit_each([tmp_path / "T1.csv"], parse_rig(RIG), load_book()))).document()
+    assert "test" not in bare
 
 
 def test_the_report_shows_what_is_known_and_where_it_was_stated() -> None:

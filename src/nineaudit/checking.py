@@ -95,21 +95,25 @@ def audit_each(
     of the recordings are findings of the first that is audited. `command`: the arguments of the run, for the report;
     `test`: what was stated of the test there."""
     from nineaudit.auditing import audit
+    from nineaudit.identity import identify
     from nineaudit.readers import read
     from nineaudit.waivers import unmatched
 
     paths = list(recordings)
     lost = unmatched(waivers, paths)
     for path in paths:
+        about = identify(rig.test, test)
         try:
-            done = audit(read(path, rig, dbc=dbc, test=test), rulebook, waivers=waivers)
+            recording = read(path, rig, dbc=dbc, test=test)
+            about = recording.test
+            done = audit(recording, rulebook, waivers=waivers)
             done = replace(done, command=shlex.join(["nineaudit", *command]) if command else "")
             yield Outcome(path, audit=_with_unmatched(done, lost))
             lost = ()
         except ConfigurationError:
             raise
         except NineauditError as error:
-            yield Outcome(path, error=error)
+            yield Outcome(path, error=error, test=about)
 
 
 def _with_unmatched(audit: Audit, lost: Sequence[Waiver]) -> Audit:

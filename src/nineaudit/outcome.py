@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.errors import NineauditError
+from nineaudit.identity import Identity
 
 if TYPE_CHECKING:
     from nineaudit.auditing import Audit
@@ -14,11 +15,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One recording of a run: its `audit`, or the `error` for which it could not be audited."""
+    """One recording of a run: its `audit`, or the `error` for which it could not be audited, and then what is known of
+    the `test` from the rig and the options."""
 
     path: Path
     audit: Audit | None = None
     error: NineauditError | None = None
+    test: Identity = field(default_factory=Identity)
 
     @property
     def verdict(self) -> str:
@@ -30,7 +33,7 @@ class Outcome:
         from nineaudit.report import failure_document, result_document
 
         if self.error is not None:
-            return failure_document(self.path, self.error, versions())
+            return failure_document(self.path, self.error, versions(), self.test)
         assert self.audit is not None
         return result_document(self.audit)
 

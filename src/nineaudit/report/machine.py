@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from nineaudit.auditing import Audit
     from nineaudit.diagnose import Diagnosis
     from nineaudit.errors import NineauditError
+    from nineaudit.identity import Identity
     from nineaudit.recording import Recording, Source
     from nineaudit.rig import Rig
 
@@ -56,12 +57,17 @@ def result_document(audit: Audit) -> dict[str, Any]:
     return sealed(document)
 
 
-def failure_document(path: Path, error: NineauditError, tool: Mapping[str, str]) -> dict[str, Any]:
-    """The document of a recording that could not be audited: verdict ``not_audited`` and the reason."""
+def failure_document(
+    path: Path, error: NineauditError, tool: Mapping[str, str], test: Identity | None = None
+) -> dict[str, Any]:
+    """The document of a recording that could not be audited: verdict ``not_audited``, the reason, and what is known of
+    the `test` without the recording."""
+    about = test.document() if test is not None else {}
     document = {
         "schema": SCHEMA,
         "tool": _tool(tool),
         "recording": {"path": path.as_posix(), "format": path.suffix.lower().lstrip(".")},
+        **({"test": about} if about else {}),
         "verdict": "not_audited",
         "reason": str(error),
         "findings": [],
