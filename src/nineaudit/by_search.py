@@ -55,7 +55,7 @@ def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
         return _nothing_found(search, base)
     candidates = _candidates(case, search, best, evidence)
     floor = _floor(search)
-    if common := _common(search, best):
+    if common := _common(case, search, best):
         return _no_channel(case, search, base, common, candidates)
     at = f"{best.statistic:.2f} per degree of freedom, {search.healthy.statistic:.3g} with it at its word"
     if (best.statistic > UNEXPLAINED * floor and best.word not in WAVEFORMS) or floor > UNEXPLAINED:
@@ -85,12 +85,12 @@ def _best(search: Search) -> Hypothesis | None:
     return next((x for x in search.found if x.channels == top.channels and x.statistic <= enough), top)
 
 
-def _common(search: Search, best: Hypothesis) -> list[Common]:
+def _common(case: Case, search: Search, best: Hypothesis) -> list[Common]:
     """The common causes that explain the record better than any channel does, or so nearly that 99 to 1 is missing."""
     if mostly_explained(search.healthy, best):
         return []
     least = max(search.found[0].evidence - ODDS_NATS * _floor(search), DETECTION_NATS)
-    found = common_causes(search.healthy, best, log_evidence(search.healthy))
+    found = common_causes(search.healthy, best, log_evidence(search.healthy), case.recording.messages)
     return [x for x in found if x.found.evidence >= least]
 
 

@@ -21,7 +21,9 @@ from nineaudit.rig import Rig
 class Trace:
     """One signal with its own clock as recorded: `time` (m,) s, `values` (m,) in `unit`.
 
-    `unit` is what the file says, None where it does not say. `signal` is its name in the file.
+    `unit` is what the file says, None where it does not say. `signal` is its name in the file; `message` that of what
+    its samples came in together with those of other signals (CAN message, topic, group, file of several), None where
+    all came alike.
     """
 
     channel: str
@@ -29,6 +31,15 @@ class Trace:
     time: FloatArray
     values: FloatArray
     unit: str | None = None
+    message: str | None = None
+
+
+@dataclass(frozen=True)
+class Message:
+    """What the samples of some channels (`columns` of the recording) came in together."""
+
+    name: str
+    columns: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -148,6 +159,15 @@ class Recording:
     @property
     def channels(self) -> tuple[str, ...]:
         return self.rig.array.channels
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """Every message with its channels, where the recording has messages."""
+        alike: dict[str, list[int]] = {}
+        for column, trace in enumerate(self.native):
+            if trace.message is not None:
+                alike.setdefault(trace.message, []).append(column)
+        return tuple(Message(name, tuple(columns)) for name, columns in alike.items())
 
     @property
     def remade(self) -> tuple[Remade, ...]:

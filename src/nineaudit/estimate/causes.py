@@ -56,7 +56,8 @@ class Cause:
     words, and the `size` of it (m for a place, a factor otherwise). `factors` of a unit: "acceleration" and
     "angular_rate" -> what puts the readings right. Where it is free: `slope` Fit of undone data -> (c,k,n) change of
     the readings per prior standard deviation of each of c parameters, `step` (c,) of them -> the cause there, and
-    `nearest` the cause at the nearest ratio of units, if one is near."""
+    `nearest` the cause at the nearest ratio of units, if one is near. `chance` nats that undoing it in Data may gain by
+    chance."""
 
     word: str
     channels: tuple[int, ...]
@@ -68,6 +69,7 @@ class Cause:
     step: Callable[[FloatArray], Cause] | None = None
     nearest: Callable[[], Cause | None] | None = None
     factors: Mapping[str, float] = field(default_factory=dict)
+    chance: Callable[[Data], float] = lambda _: 0.0
 
 
 def tried(array: SensorArray) -> Iterator[Cause]:

@@ -7,10 +7,13 @@ without the channel that is to be named; the few that do as well are fitted to t
 the nearest that was tried, and so is the place of all accelerometers of one block:
 
     y_i = n_i·(a0 + α × (r_i + e) + ω × (ω × (r_i + e)))    one e for all i of the block
+
+So are the lags of messages that hold several channels each (message_delays.py).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +24,14 @@ from nineaudit.estimate import hypotheses as h
 from nineaudit.estimate.causes import NEAR_UNIT, Cause, near, tried
 from nineaudit.estimate.condense import MEDIAN_SPREAD
 from nineaudit.estimate.hypotheses import Hypothesis
+from nineaudit.estimate.message_delays import delays
 from nineaudit.estimate.model import Data, Extra
 from nineaudit.estimate.normal import eliminate, normal_equations
 from nineaudit.estimate.point import point
 from nineaudit.estimate.separation import DETECTION_NATS, coarser
 from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import ROUGH, Fit, fit, log_determinant
+from nineaudit.recording import Message
 
 COARSE, LOOKS = 250, 3
 """Samples and iterations of the first tries."""
@@ -110,9 +115,12 @@ def _at_rest(data: Data) -> FloatArray:
     return np.asarray((data.weight * data.readings)[(data.still[:-1] > 0) & (data.still[1:] > 0)])
 
 
-def common_causes(healthy: Fit, best: Hypothesis | None, reference: float) -> list[Common]:
+def common_causes(
+    healthy: Fit, best: Hypothesis | None, reference: float, messages: Sequence[Message] = ()
+) -> list[Common]:
     """The common causes that may explain the record as well as the `best` hypothesis of a channel, fitted, best first;
-    `reference`: log evidence of no fault. Where no channel was looked at (None), those that beat no fault."""
+    `reference`: log evidence of no fault. Where no channel was looked at (None), those that beat no fault. `messages`:
+    what the channels came in, whose lags are looked for."""
     at = coarser(healthy, COARSE)
     data = replace(at.data, extra=None)
     least = DETECTION_NATS if best is None else PART * best.evidence - SPARE
@@ -123,13 +131,25 @@ def common_causes(healthy: Fit, best: Hypothesis | None, reference: float) -> li
     clear = best is None or healthy.statistic > CLEARLY * best.statistic
     far = _far(at, data, best) if scale or clear else []
     likely = [Try(x.cause, fit(x.cause.undo(data), x.required.omega, None, LOOKS)) for x in far[:TRIED]]
-    likely += [Try(cause, at) for _, cause in sorted(close, key=lambda x: -x[0])[:TRIED]]
+    likely += [Try(cause, at) for cause in _most_promising(close)]
+    late = [(promised(at, cause, alone), cause) for cause in delays(healthy.data.time, messages)]
+    likely += [Try(cause, at) for cause in _most_promising([x for x in late if x[0] > least])]
     if not likely:
         return []
     coarse = h.log_evidence(fit(data, at.omega, at.theta, LOOKS))
     settled = [x for y in likely if _evidence(x := _freed(data, y)) - coarse > least]
     whole = [_whole(healthy.data, x, reference) for x in _once(settled)]
-    return sorted(whole, key=lambda x: -x.found.evidence)
+    return _one_a_delay(sorted(whole, key=lambda x: -x.found.evidence))
+
+
+def _one_a_delay(found: list[Common]) -> list[Common]:
+    """Without lags of the same messages as a better one, however they were found."""
+    first = {x.found.channels: x for x in reversed(found) if x.cause.word == "delay"}
+    return [x for x in found if x.cause.word != "delay" or x is first[x.found.channels]]
+
+
+def _most_promising(causes: list[tuple[float, Cause]]) -> list[Cause]:
+    return [cause for _, cause in sorted(causes, key=lambda x: -x[0])[:TRIED]]
 
 
 def _once(settled: list[Try]) -> list[Try]:
@@ -147,7 +167,7 @@ def _same(one: Cause, other: Cause) -> bool:
         "unit",
         False,
     )
-    return alike and one.channels == other.channels and abs(one.size / other.size - 1.0) < NEAR_UNIT
+    return alike and one.channels == other.channels and abs(one.size - other.size) < NEAR_UNIT * abs(other.size)
 
 
 def _far(at: Fit, data: Data, best: Hypothesis | None) -> list[Try]:
@@ -234,8 +254,10 @@ def _whole(data: Data, at: Try, reference: float) -> Common:
     if unit is not None and unit.size != at.cause.size:
         other = _fitted(data, unit, best.required.omega)
         best = other if _evidence(other) > _evidence(best) - CERTAIN else best
+    if best.cause.word == "delay":  # of a coarser record a lag is known to a part of its samples
+        best = _freed(data, best)
     cause, left = best.cause, best.required
-    name = "size" if cause.word == "position" else "factor"
+    name = "size" if cause.word in ("position", "delay") else "factor"
     evidence = _evidence(best) - reference
     return Common(cause, Hypothesis(cause.channels, cause.word, evidence, left.statistic, {name: cause.size}))
 
@@ -248,4 +270,4 @@ def _evidence(tried: Try) -> float:
     """Log evidence of a fitted cause; what was free in it costs ½ ln det of how well it is told."""
     at, cause = tried.required, tried.cause
     freedom = 0.0 if cause.slope is None else max(0.5 * (tied(at, cause.slope(at))[2] - at.log_det), 0.0)
-    return h.log_evidence(at) - cause.price - freedom
+    return h.log_evidence(at) - cause.price - freedom - cause.chance(at.data)

@@ -53,7 +53,8 @@ def read_signals(log: Any, path: Path, rig: Rig) -> Contents:
         values = _numbers(signal, sensor.channel, path)
         invalid += int(np.count_nonzero(np.isnan(values)))
         time = np.asarray(signal.timestamps, dtype=np.float64)
-        traces.append(Trace(sensor.channel, signal.name, frozen(time), frozen(values), signal.unit or None))
+        at = sensor.channel, signal.name, frozen(time), frozen(values)
+        traces.append(Trace(*at, signal.unit or None, f"group {_title(log, group)}"))
     counts = {"groups": float(len(log.groups)), "invalid_values": float(invalid)}
     note = f"time counts from the start of the measurement, {log.header.start_time.isoformat()}"
     return Contents(tuple(traces), counts, (note,), stated=_started(log, path))

@@ -75,7 +75,8 @@ def read_can(path: Path, rig: Rig) -> Contents:
         if not carried.any():
             raise _never_carried(signal, sensor.channel, len(chosen), path)
         time = (log.time[chosen[carried]] - base) / 1e9
-        traces.append(Trace(sensor.channel, signal.name, read_only(time), read_only(values), signal.signal.unit))
+        at = sensor.channel, signal.name, read_only(time), read_only(values)
+        traces.append(Trace(*at, signal.signal.unit, signal.message.name))
     known = {BusSignal(m, None).key for m in messages}
     counts = {
         **_counts(log),

@@ -48,7 +48,11 @@ def join(paths: Sequence[Path], rig: Rig, read_file: ReadFile) -> Joined:
         for part, (found, source) in zip(rig.parts, read, strict=True)
     ]
     sources = [source for _, source in read]
-    traces = [_moved(t, o.value) for (found, _), o in zip(read, offsets, strict=True) for t in found.traces]
+    traces = [
+        replace(_moved(t, o.value), message=f"{t.message} of {path.name}" if t.message else path.name)
+        for path, (found, _), o in zip(paths, read, offsets, strict=True)
+        for t in found.traces
+    ]
     counts: Counter[str] = Counter()
     for source in sources:
         counts.update(source.counts)

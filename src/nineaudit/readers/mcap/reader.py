@@ -55,7 +55,7 @@ def read_mcap(path: Path, rig: Rig) -> Contents:
     for sensor, (topic, name) in zip(rig.array.sensors, places, strict=True):
         timed, values = clocks[topic].there, _values(used[topic], name)
         values = read_only(values if timed.all() else values[timed])
-        traces.append(Trace(sensor.channel, f"{topic}:{name}", times[topic], values))
+        traces.append(Trace(sensor.channel, f"{topic}:{name}", times[topic], values, message=topic))
     counts = _counts(book, topics, used) | {
         "messages_without_time": sum(int(np.count_nonzero(~timed)) for _, timed in clocks.values()),
         "invalid_values": sum(int(np.count_nonzero(np.isnan(t.values))) for t in traces),
