@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from nineaudit.campaign.lake import ENTRY, Lake, hashed
+from nineaudit.campaign.lake import ENTRY, Lake, contents, current, entry_name, hashed
 from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.files import is_sealed
 
@@ -52,12 +52,20 @@ def current_entries(lake: Lake, edition: str, damaged: list[Damaged]) -> Iterato
         batch = places[start : start + BATCH]
         for (uri, place), data in zip(batch, _read(lake, [place for _, place in batch]), strict=True):
             try:
-                entry = checked(data, place)
+                entry = _moved(lake, edition, uri) if data is None else checked(data, place)
                 if entry["uri"] != uri or entry["edition"] != edition:
                     raise RecordingError(f"is of another recording or edition: {entry['uri']} {entry['edition']}")
                 yield entry
             except RecordingError as error:
                 damaged.append(Damaged(place, str(error)))
+
+
+def _moved(lake: Lake, edition: str, uri: str) -> dict[str, Any]:
+    """The entry of a recording whose entry went after its pointer was read: a run put another in its place.
+    RecordingError."""
+    pointer = current(lake, edition, uri)
+    place = entry_name(uri, str(pointer["key"])) if pointer else ""
+    return checked(_read(lake, [place])[0] if place else None, place)
 
 
 def checked(data: bytes | None, place: str) -> dict[str, Any]:
@@ -109,16 +117,11 @@ def _object(data: bytes | None) -> dict[str, Any]:
 
 def _read(lake: Lake, names: Sequence[str]) -> list[bytes | None]:
     """The bytes of documents; None of one that is not there. ConfigurationError: the place cannot be read."""
-    if not names:
-        return []
-    paths = [lake.place(name) for name in names]
-    found = lake.fs.cat(paths, on_error="return")
-    by_path = {str(path): data for path, data in found.items()}
-    return [_bytes(by_path.get(lake.fs._strip_protocol(path)), path) for path in paths]
+    return [_bytes(data, lake.place(name)) for name, data in zip(names, contents(lake, names), strict=True)]
 
 
 def _bytes(data: Any, path: str) -> bytes | None:
-    if data is None or isinstance(data, FileNotFoundError):
+    if isinstance(data, FileNotFoundError):
         return None
     if isinstance(data, Exception):
         raise ConfigurationError(f"cannot be read: {data}", file=path)

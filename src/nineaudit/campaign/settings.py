@@ -53,12 +53,13 @@ class Setting:
         return edition_of(self.rulebook.sha256, versions()["version"])
 
     def parts_of_key(self, today: dt.date) -> list[object]:
-        """What an entry depends on besides the recording: rig, databases, rules, tool, waivers and which hold."""
+        """What an entry depends on besides the recording: rig (its name may be that of the file), databases, rules, tool,
+        waivers and which hold."""
         from nineaudit.auditing import versions
 
         held = [waiver.holds(today) for waiver in self.waivers or ()]
         files = {name: self.document[name] for name in ("databases", "dbc", "waivers")}
-        return [self.rig.sha256, self.rulebook.sha256, versions()["version"], _sha256(files), held]
+        return [self.rig.sha256, self.rig.name, self.rulebook.sha256, versions()["version"], _sha256(files), held]
 
 
 def collect(
