@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nineaudit.array import FloatArray, frozen
-from nineaudit.errors import ConfigurationError, RecordingError
+from nineaudit.errors import RecordingError
 from nineaudit.readers import Contents, assemble
 from nineaudit.readers.clocks.clock import clock_of, in_order
 from nineaudit.recording import Clock, Recording, Source, Trace
@@ -241,7 +241,7 @@ def test_the_unit_of_the_recording_comes_before_that_of_the_rig() -> None:
 
 @pytest.mark.parametrize("unit", ["furlong", "deg/s"])
 def test_an_unknown_unit_names_signal_and_unit(unit: str) -> None:
-    with pytest.raises(ConfigurationError, match=f"x.csv: signal q: unknown unit of acceleration; found '{unit}'"):
+    with pytest.raises(RecordingError, match=f"x.csv: signal q: unknown unit of acceleration; found '{unit}'"):
         assembled(same(), same(), same(), units=(None, unit, None))
 
 

@@ -143,8 +143,8 @@ def test_readers_say_what_the_samples_came_in(tmp_path: Path, suffix: str) -> No
 def test_files_of_one_recording_are_what_their_channels_came_in(tmp_path: Path) -> None:
     text = "[rig]\nname='x'\n[units]\nacceleration='m/s^2'\n[recording]\nfilter_class='none'\n[uncertainty]\nnoise=1\n"
     for c in "pq":
-        text += f"[[part]]\nfile='*_{c}.csv'\nchannels=['{c}']\n"
+        text += f"[[part]]\nfile='{{name}}_{c}.csv'\nchannels=['{c}']\n"
         text += f"[[sensor]]\nchannel='{c}'\nkind='accelerometer'\nposition=[0,0,0]\naxis=[1,0,0]\nrange=100\n"
         (tmp_path / f"T_{c}.csv").write_text(f"time_s,{c}\n" + "".join(f"{i / 100},{i % 7}\n" for i in range(50)))
-    found = read([tmp_path / "T_p.csv", tmp_path / "T_q.csv"], parse_rig(text))
+    found = read(tmp_path / "T_p.csv", parse_rig(text))
     assert found.messages == (Message("T_p.csv", (0,)), Message("T_q.csv", (1,)))

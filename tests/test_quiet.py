@@ -52,6 +52,12 @@ def test_stated_interval_is_taken_and_checked():
     assert (quiet.t_start, quiet.t_end, quiet.stated) == (1.6, 2.0, True)
     with pytest.raises(ConfigurationError, match=r"pre_trigger.*holds 0 samples.*between 0 s and 3.999 s"):
         find_quiet(TIME, moving(), np.full(5, 0.1), (-0.5, -0.1))
+    says = r"holds 11 samples.*at least 16.*if the body is at rest then, state \[1\.595, 1\.61\]; or leave it out"
+    with pytest.raises(ConfigurationError, match=says):
+        find_quiet(TIME, moving(), np.full(5, 0.1), (1.6, 1.61))
+    advised = find_quiet(TIME, moving(), np.full(5, 0.1), (1.5945, 1.61))
+    assert advised is not None
+    assert (advised.stop - advised.start, advised.t_end) == (16, 1.61)
 
 
 def test_noise_level_measures_noise():

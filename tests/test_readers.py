@@ -372,7 +372,7 @@ def test_the_unit_of_the_database_comes_first(blf: Path) -> None:
     np.testing.assert_allclose(found.readings[:, accelerations] * 9.80665, MOTION.readings[:, accelerations], atol=3e-3)
     assert any("a0x in m/s^2 (rig: g_0)" in note for note in found.source.notes)
     dbc.write_text(text.replace('"g_0"', '"furlong"'))
-    with pytest.raises(ConfigurationError, match=r"signal NAAP_A.A0X: unknown unit of acceleration; found 'furlong'"):
+    with pytest.raises(RecordingError, match=r"signal NAAP_A.A0X: unknown unit of acceleration; found 'furlong'"):
         read_can(blf)
 
 

@@ -388,9 +388,38 @@ def test_dates_are_told_apart_from_too_few_samples(tmp_path: Path) -> None:
         contents(tmp_path, "time,p,q\n" + text)
 
 
-def test_brackets_that_hold_no_unit_are_told(tmp_path: Path) -> None:
-    found = contents(tmp_path, "time,p [V],q\n" + rows())
-    assert "column 'p [V]': its brackets hold no unit of acceleration and count as its name" in found.notes
+@pytest.mark.parametrize("name", ["p (100g)", "p [100 g]", "p (head)", "p (CFC1000)", "p [X]", "p [-]", "p (3)"])
+def test_brackets_that_hold_no_unit_are_told(tmp_path: Path, name: str) -> None:
+    found = contents(tmp_path, f"time,{name},q\n" + rows())
+    assert f"column '{name}': its brackets hold no unit of acceleration and count as its name" in found.notes
+    assert found.traces[0].unit is None
+
+
+@pytest.mark.parametrize("name", ["p [V]", "p (mV/V)", "p [EU]", "p (counts)", "p [rad/s]", "p (deg/s)", "p [furlong]"])
+def test_a_unit_in_brackets_that_is_none_of_the_quantity_is_an_error(tmp_path: Path, name: str) -> None:
+    """It was a note among others, and the readings were taken to be in the rig's unit."""
+    path, unit = tmp_path / "t.csv", name[3:-1]
+    path.write_text(f"time,{name},q\n" + rows())
+    says = (
+        rf"t.csv: signal p: unknown unit of acceleration; found '{unit}'; .* in the rig's m/s\^2 all the same"
+    )
+    with pytest.raises(RecordingError, match=says):
+        read(path, RIG)
+    named = SMALL.format(recording="").replace('channel="p"', f'channel="p"\nsignal="{name}"')
+    np.testing.assert_array_equal(read(path, parse_rig(named)).column("p"), P)  # as the error advises
+    path.write_text(f"time,{name},q\ns,g,g\n" + rows())  # a row of units says it better
+    np.testing.assert_allclose(read(path, RIG).column("p"), 9.80665 * P, rtol=1e-12)
+
+
+def test_millivolts_in_brackets_are_those_of_a_rig_in_millivolts(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("time,p [mV],q (mV)\n" + rows())
+    text = SMALL.format(recording="").replace('"m/s^2"', '"mV"').replace("axis=", "sensitivity=2.0\naxis=")
+    found = read(tmp_path / "t.csv", parse_rig(text))
+    np.testing.assert_allclose(found.column("p"), P / 2.0 * 9.80665, rtol=1e-12)
+    assert not [note for note in found.source.notes if "brackets" in note]
+    (tmp_path / "t.csv").write_text("time,p [V],q (mV)\n" + rows())
+    with pytest.raises(RecordingError, match="found 'V'"):
+        read(tmp_path / "t.csv", parse_rig(text))
 
 
 def test_what_was_found_is_told_in_a_sentence(tmp_path: Path) -> None:

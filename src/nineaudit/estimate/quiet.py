@@ -56,9 +56,19 @@ def find_quiet(
                 place="[recording] pre_trigger",
                 found=list(stated),
                 expected=f"at least {SHORTEST} samples between {time[0]:.6g} s and {time[-1]:.6g} s",
+                advice=_longer(time, stop, stated[1]),
             )
         return Quiet(start, stop, float(time[start]), float(time[stop - 1]), stated=True)
     return _quietest(time, readings, noise, anywhere)
+
+
+def _longer(time: FloatArray, stop: int, end: float) -> str:
+    """What to state in place of an interval that ends at `end` s, behind sample `stop`, and is too short."""
+    looked_for = "leave it out to have a quiet interval looked for"
+    if stop < SHORTEST:
+        return looked_for
+    begin = time[stop - SHORTEST] - 0.5 * float(np.median(np.diff(time)))
+    return f"if the body is at rest then, state [{begin:.4g}, {end:.4g}]; or {looked_for}"
 
 
 def _quietest(time: FloatArray, readings: FloatArray, noise: FloatArray, anywhere: bool) -> Quiet | None:

@@ -39,7 +39,7 @@ def assemble(contents: Contents, rig: Rig, source: Source, u_parts: Mapping[str,
     recording's rig (alignment.py). Samples whose stamp is not above all earlier ones are not used, but counted.
     `u_parts`: standard uncertainty, s, of the clock of each channel, where each is in a part of the recording; the time
     base is then that during which all parts were recording.
-    Raises RecordingError: too few samples, no time that the traces have in common, ConfigurationError: a unit.
+    Raises RecordingError: too few samples, no time that the traces have in common, a unit that is none of the quantity.
     """
     by_channel = {trace.channel: trace for trace in contents.traces}
     traces, notes = _of_our_age([by_channel[sensor.channel] for sensor in rig.array.sensors], source)

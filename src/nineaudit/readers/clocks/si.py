@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from nineaudit.array import Sensor, read_only
-from nineaudit.errors import ConfigurationError
+from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.recording import Source, Trace
 from nineaudit.signals import si_factor
 from nineaudit.units import counted
@@ -49,15 +49,16 @@ def stated_units(traces: Sequence[Trace], rig: Rig) -> tuple[str, ...]:
 
 
 def _factor(sensor: Sensor, unit: str | None, source: Source) -> float:
-    """si_factor; a unit that is none is told with the file."""
+    """si_factor. RecordingError: the recording's unit is none of the quantity."""
     try:
         return si_factor(sensor, unit)
     except ConfigurationError as error:
-        raise ConfigurationError(
+        raise RecordingError(
             error.what,
             file=source.path,
             place=error.place,
             found=error.found,
             expected=error.expected,
-            advice=error.advice,
+            advice=f"if these readings are in the rig's {sensor.unit} all the same, mend that unit in the file or the "
+            "database, or make the whole name of a table's column, brackets too, the rig's signal",
         ) from error

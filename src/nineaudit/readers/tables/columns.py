@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nineaudit.array import FloatArray
+from nineaudit.array import FloatArray, Sensor
 from nineaudit.errors import RecordingError
 from nineaudit.readers.contents import Contents
 from nineaudit.readers.tables.dialect import base
-from nineaudit.readers.tables.preamble import TIME_NAME, unit_in_name
+from nineaudit.readers.tables.preamble import TIME_NAME, is_unit, unit_in_name
 from nineaudit.recording import Damage, Trace
 from nineaudit.signals import QUANTITY, suggestion, time_unit
 from nineaudit.units import counted, factor
@@ -52,13 +52,21 @@ def locate(rig: Rig, names: Sequence[str], path: Path, place: str, *, timeless: 
     """
     time = _time_column(rig, names, path, place, timeless)
     channels = tuple(_find(names, s.signal, f"channel {s.channel!r}", path, place) for s in rig.array.sensors)
-    units = tuple(unit_in_name(names[i], s.kind) for i, s in zip(channels, rig.array.sensors, strict=True))
+    units = tuple(_unit(names[i], s) for i, s in zip(channels, rig.array.sensors, strict=True))
     odd = [
         f"column {names[i]!r}: its brackets hold no unit of {QUANTITY[s.kind].replace('_', ' ')} and count as its name"
         for i, s, unit in zip(channels, rig.array.sensors, units, strict=True)
         if unit is None and names[i] != s.signal
     ]
     return with_units(Columns(tuple(names), time, channels, units, notes=tuple(odd)), rig, {})
+
+
+def _unit(name: str, sensor: Sensor) -> str | None:
+    """The unit in a column's name; where the rig has the whole name, only one that is known of that quantity."""
+    unit = unit_in_name(name, sensor.kind)
+    if name != sensor.signal or unit is None or unit == sensor.unit:
+        return unit
+    return unit if is_unit(unit, QUANTITY[sensor.kind]) else None
 
 
 def with_units(columns: Columns, rig: Rig, stated: Mapping[int, str]) -> Columns:

@@ -44,6 +44,14 @@ _STEP: Final = re.compile(
 _WORD: Final = re.compile(r"[^\W\d_][^\W\d_/-][\w ./()%:#-]+")
 _NO_VALUE: Final = re.compile(r"null|none|n/?a\b|missing|invalid|over|error", re.IGNORECASE)
 _VALUE: Final = re.compile(r"\s*([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)\s*([a-zA-Zµ]*)")
+_NO_UNIT: Final = re.compile(r"[xyz?-]+|\d.*|CFC.*|n/?a|none|unknown|no ?value", re.IGNORECASE)
+"""What stands in brackets and is no unit: an axis, a range, a filter class, nothing."""
+_LIKE_A_UNIT: Final = re.compile(
+    r"[munµkM]?V(/\w+)?|[mµk]?[ANW]|k?Nm|[kM]?Pa|bar|[kM]?Hz|%|%? ?FS|°\w*|deg|rad|m?g's|gees?|counts?|bits?|LSB|"
+    r"digits?|EU|"
+    r"[^\W\d_]+/[^\W\d_]+[\d²^]*",
+)
+"""Units that a measuring chain writes besides those of the quantity; in round brackets words stand as well."""
 _SCALE: Final = {
     "hz": 1.0, "khz": 1e3, "mhz": 1e6, "sps": 1.0, "ksps": 1e3, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3,
     "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "": 1.0,
@@ -105,9 +113,16 @@ def surroundings(table: Dialect, time: int | None, channels: Sequence[int], rig:
 
 
 def unit_in_name(name: str, kind: Kind) -> str | None:
-    """The unit in brackets that ends the name of a column, None where it is none of that quantity."""
-    unit = _bare(name.removeprefix(base(name)).strip())
-    return unit if unit and _is_unit(unit, QUANTITY[kind]) else None
+    """The unit in brackets that ends the name of a column, None where what they hold is a range, an axis, or a word.
+
+    A unit of another quantity, or one that is not known (`[V]`, `(counts)`), is one all the same: that of the readings.
+    """
+    brackets = name.removeprefix(base(name)).strip()
+    unit = _bare(brackets)
+    if not unit or _NO_UNIT.fullmatch(unit) or is_number(unit):
+        return None
+    known = any(is_unit(unit, quantity) for quantity in (QUANTITY[kind], *FACTORS))
+    return unit if known or brackets.startswith("[") or _LIKE_A_UNIT.fullmatch(unit) else None
 
 
 def _rows_below(table: Dialect) -> Iterator[tuple[str, list[str], int]]:
@@ -167,10 +182,11 @@ def _bare(cell: str) -> str:
 
 def _is_any_unit(cell: str, rig: Rig) -> bool:
     names = (rig.units.acceleration, rig.units.angular_rate)
-    return cell in names or any(_is_unit(_bare(cell), quantity) for quantity in FACTORS)
+    return cell in names or any(is_unit(_bare(cell), quantity) for quantity in FACTORS)
 
 
-def _is_unit(text: str, quantity: Quantity) -> bool:
+def is_unit(text: str, quantity: Quantity) -> bool:
+    """Whether a text is a known unit of a quantity."""
     try:
         factor(text, quantity)
     except ConfigurationError:
