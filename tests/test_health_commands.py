@@ -19,6 +19,7 @@ from nineaudit.campaign.health.page import section
 from nineaudit.campaign.index_page import render
 from nineaudit.campaign.index_rows import Index
 from nineaudit.estimate.hypotheses import healthy_fit
+from nineaudit.files import sealed
 from nineaudit.report.sensors import _text, unpacked
 from nineaudit.rig import load_rig, parse_rig, preset_text
 from nineaudit.simulate import simulate
@@ -41,7 +42,7 @@ def surer(entry: dict[str, Any], times: float) -> dict[str, Any]:
     told = block["information"]
     eta, matrix = unpacked(told)
     more = {"eta": _text(times * eta), "matrix": _text(times * matrix[np.triu_indices(len(eta))])}
-    return entry | {"result": entry["result"] | {"sensors": block | {"information": told | more}}}
+    return entry | {"result": sealed(entry["result"] | {"sensors": block | {"information": told | more}})}
 
 
 @pytest.fixture(scope="module")

@@ -6,15 +6,16 @@ They return what is to be printed, with the exit code. Heavy modules are importe
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from nineaudit.campaign.commands import campaign_app
+from nineaudit.campaign.entries import Damaged, chosen, current_entries
 from nineaudit.campaign.table_commands import Edition, Ended, LakeOption
-from nineaudit.errors import ConfigurationError
+from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.options import Force, example
 from nineaudit.units import counted
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from nineaudit.calibrating.changes import Keys
     from nineaudit.campaign.health.assess import Health
     from nineaudit.campaign.health.rig_file import Told
+    from nineaudit.campaign.lake import Lake
     from nineaudit.rig import Rig
 
 Tolerance = Annotated[
@@ -45,12 +47,22 @@ def health(
     """
     from nineaudit.campaign.health.assess import assess
     from nineaudit.campaign.health.words import document, text_table
-    from nineaudit.campaign.lake import entries, open_lake
+    from nineaudit.campaign.lake import open_lake
 
     _require_tolerance(tolerance)
-    found = assess(entries(open_lake(lake), edition), tolerance)
+    opened = open_lake(lake)
+    found = assess(_sound(opened, chosen(opened, edition)), tolerance)
     said = json.dumps(document(found), indent=2, ensure_ascii=False) if as_json else text_table(found)
     return [said], 1 if found.action else 0
+
+
+def _sound(lake: Lake, edition: str) -> Iterator[dict[str, Any]]:
+    """The entries of an edition. RecordingError where one is damaged: a sensor is judged by all of its tests."""
+    damaged: list[Damaged] = []
+    yield from current_entries(lake, edition, damaged)
+    for one in damaged[:1]:
+        advice = f"{len(damaged)} damaged: remove those that `campaign compact` names, and run the campaign again"
+        raise RecordingError(f"cannot be used: {one.why}", file=one.place, advice=advice)
 
 
 def _require_tolerance(value: float) -> None:
@@ -73,7 +85,7 @@ def rig(
     from nineaudit.calibrating.rig_text import calibrated
     from nineaudit.campaign.health.assess import assess
     from nineaudit.campaign.health.rig_file import evidence, improved
-    from nineaudit.campaign.lake import entries, head, open_lake
+    from nineaudit.campaign.lake import open_lake
     from nineaudit.campaign.reporting import lake_name
     from nineaudit.outputs import protect, require_absent, write_text
     from nineaudit.report.machine import to_json
@@ -84,11 +96,12 @@ def rig(
     for path in (output, beside):
         require_absent(path, force)
     opened, stated = open_lake(lake), load_rig(rig)
-    found = assess(entries(opened, edition))
+    edition = chosen(opened, edition)
+    found = assess(_sound(opened, edition))
     changes, told = improved(found, stated)
     if not changes:
         return [f"the tests tell nothing that {rig} does not say: {output} is not written"], 0
-    about = {"name": lake_name(opened), "edition": edition or head(opened)}
+    about = {"name": lake_name(opened), "edition": edition}
     notes = _notes(changes, told, found, stated, about)
     write_text(output, calibrated(stated, changes, notes, output))
     write_text(beside, to_json(evidence(told, changes, found, stated, about)))

@@ -53,8 +53,8 @@ class Setting:
         return edition_of(self.rulebook.sha256, versions()["version"])
 
     def parts_of_key(self, today: dt.date) -> list[object]:
-        """What an entry depends on besides the recording: rig (its name may be that of the file), databases, rules, tool,
-        waivers and which hold."""
+        """What an entry depends on besides the recording: rig (its name may be that of its file), databases, rules,
+        tool, waivers and which hold."""
         from nineaudit.auditing import versions
 
         held = [waiver.holds(today) for waiver in self.waivers or ()]

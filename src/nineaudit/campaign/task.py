@@ -70,7 +70,7 @@ def audit_into(
     with ExitStack() as stack:
         try:
             seen = signature(recording_files(uri, setting.rig.parts))
-            known = _known(lake, uri, seen, setting, test) if resume else None
+            known = _known(lake, uri, seen, setting, test, reports) if resume else None
             if known is not None:
                 return known
             path = stack.enter_context(fetched(uri, setting.rig.parts))
@@ -79,7 +79,7 @@ def audit_into(
         except OSError as error:
             return write_failure(lake, uri, setting, test, f"cannot be fetched: {error}", transient=True)
         hashes = _hashes(path, setting)
-        kept = _kept(lake, uri, key_of(hashes, setting, test), setting.edition)
+        kept = _kept(lake, uri, key_of(hashes, setting, test), setting.edition, reports)
         summary = kept or _written(lake, uri, path, hashes, setting, test, reports)
     if seen is not None and hashes:
         lakes.write(lake, _stat_name(uri), {"uri": uri, "signature": seen, "sha256": hashes})
@@ -109,7 +109,7 @@ def write_failure(
     result = _as_named(document, uri, "", setting)
     entry = _entry(uri, key_of([], setting, test), setting, test, result)
     entry = {**entry, "reason": result["reason"], "transient": True} if transient else entry
-    return _put(lake, entry, gate=None, transient=transient)
+    return _put(lake, entry, None)
 
 
 def key_of(hashes: Sequence[str], setting: Setting, test: Mapping[str, str]) -> str:
@@ -124,25 +124,44 @@ def require_reports(reports: str) -> None:
         raise ConfigurationError("no such choice", place="--reports", found=reports, expected=", ".join(REPORTS))
 
 
-def _known(lake: Lake, uri: str, seen: str | None, setting: Setting, test: dict[str, str]) -> Summary | None:
+def _known(
+    lake: Lake, uri: str, seen: str | None, setting: Setting, test: dict[str, str], reports: str
+) -> Summary | None:
     """The summary of a recording that is as it was when it was read last, and is audited."""
     stat = lakes.read(lake, _stat_name(uri)) if seen is not None else None
     if stat is None or stat["signature"] != seen:
         return None
-    return _kept(lake, uri, key_of(stat["sha256"], setting, test), setting.edition)
+    return _kept(lake, uri, key_of(stat["sha256"], setting, test), setting.edition, reports)
 
 
-def _kept(lake: Lake, uri: str, key: str, edition: str) -> Summary | None:
-    """The summary of an entry that is there, which becomes the current one; None where it is to be made."""
+def _kept(lake: Lake, uri: str, key: str, edition: str, reports: str) -> Summary | None:
+    """The summary of an entry that is there, which becomes the current one; None where it is to be made, or its report
+    is."""
     pointer = lakes.current(lake, edition, uri)
-    if pointer is not None and pointer["key"] == key:
-        return None if pointer.get("transient") else _summary(uri, edition, pointer, kept=True)
-    entry = lakes.read_entry(lake, uri, key)
-    if entry is None or entry.get("transient"):
+    if pointer is None or pointer["key"] != key:
+        entry = lakes.read_entry(lake, uri, key)
+        if entry is None or entry.get("transient"):
+            return None
+        pointer = {"key": key, **_pointer(entry, _gate_of_document(entry["result"]))}
+        lakes.point(lake, edition, uri, **pointer)
+    elif pointer.get("transient") or not lakes.exists(lake, lakes.entry_name(uri, key)):
         return None
-    pointer = {"key": key, "verdict": entry["result"]["verdict"], "gate": _gate_of_document(entry["result"])}
-    lakes.point(lake, edition, uri, **pointer)
+    asked = pointer["verdict"] != "not_audited" and _asked(reports, pointer["gate"])
+    if asked and not lakes.exists(lake, lakes.report_name(uri, key)):
+        return None
     return _summary(uri, edition, pointer, kept=True)
+
+
+def _asked(reports: str, gate: str | None) -> bool:
+    """Whether a report is kept."""
+    return reports == "all" or (reports == "failed" and gate == "error")
+
+
+def _pointer(entry: Mapping[str, Any], gate: str | None) -> dict[str, Any]:
+    """What the pointer to an entry says of it."""
+    found = {"verdict": entry["result"]["verdict"], "gate": gate}
+    found |= {"reason": entry["result"]["reason"]} if "reason" in entry["result"] else {}
+    return found | ({"transient": True} if entry.get("transient") else {})
 
 
 def _written(
@@ -150,16 +169,15 @@ def _written(
 ) -> Summary:
     entry, outcome = _audited(uri, setting, test, path, hashes)
     gate = _gate_of_document(entry["result"])
-    if outcome.audit is not None and (reports == "all" or (reports == "failed" and gate == "error")):
+    if outcome.audit is not None and _asked(reports, gate):
         _write_report(lake, outcome, entry)
-    return _put(lake, entry, gate=gate, transient=False)
+    return _put(lake, entry, gate)
 
 
-def _put(lake: Lake, entry: dict[str, Any], *, gate: str | None, transient: bool) -> Summary:
-    pointer = {"verdict": entry["result"]["verdict"], "gate": gate} | ({"transient": True} if transient else {})
+def _put(lake: Lake, entry: dict[str, Any], gate: str | None) -> Summary:
+    pointer = _pointer(entry, gate)
     lakes.write_entry(lake, entry, **pointer)
-    summary = _summary(entry["uri"], entry["edition"], {"key": entry["key"], **pointer}, kept=False)
-    return summary | ({"reason": entry["result"]["reason"]} if "reason" in entry["result"] else {})
+    return _summary(entry["uri"], entry["edition"], {"key": entry["key"], **pointer}, kept=False)
 
 
 def _summary(uri: str, edition: str, pointer: Mapping[str, Any], *, kept: bool) -> Summary:
@@ -171,6 +189,7 @@ def _summary(uri: str, edition: str, pointer: Mapping[str, Any], *, kept: bool) 
         "gate": pointer["gate"],
         "kept": kept,
         "transient": bool(pointer.get("transient")),
+        **({"reason": pointer["reason"]} if "reason" in pointer else {}),
     }
 
 
