@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import os
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from campaign_entries import EDITION, entries, lake_of
+from campaign_entries import EDITION, entries, entry, lake_of
 from campaigns import campaign
+from nineaudit import cli
 from nineaudit.campaign import entries as reading
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign import task
 from nineaudit.campaign.compact import compact
+from nineaudit.campaign.health.assess import Health, Member, State
+from nineaudit.campaign.health.page import section
+from nineaudit.campaign.stale import behind
+
+
+def called(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([str(argument) for argument in arguments])
+    shown = capsys.readouterr()
+    return int(ended.value.code or 0), shown.out, shown.err
 
 
 @pytest.mark.parametrize("name", ["lake [1]", "lake*", "lake?", "lake #1 ü"])
@@ -88,3 +101,45 @@ def test_the_key_is_of_what_the_result_says_and_not_of_where_the_rig_is() -> Non
     named = task.audit_one("tests/T1.csv", "sled.toml")
     assert named["result"]["rig"]["name"] == "sled"
     assert named["key"] != key
+
+
+def test_names_of_sensors_do_not_lie_on_each_other() -> None:
+    def member(i: int) -> Member:
+        seat = ("a head form with a long name", f"channel_of_many_signs_{i}")
+        state = State.TOO_FEW if i % 2 else State.RECALIBRATE
+        name = f"{seat[1]} of {seat[0]}"
+        return Member(name, False, False, (seat,), 3, "", "", {"gain": (0.01 * i, 0.01)}, (), state, True)
+
+    sensors = tuple(sorted(map(member, range(40)), key=lambda m: list(State).index(m.state)))
+    strip = section(Health(sensors, (), (), {}, 3, False, 0.01)).charts[0]
+    at = [place for place, _ in strip.across]
+    assert sensors[0].name == sorted(m.name for m in sensors)[int(at[0])]
+    assert min(b - a for a, b in pairwise(at)) >= 40 / 5
+    assert all(len(name) <= 12 and "head form" not in name for _, name in strip.across)
+
+
+def test_a_query_of_tables_that_are_behind_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lake = lake_of(tmp_path / "lake", entries(3))
+    compact(lake)
+    query = ("campaign", "query", lake.uri, "SELECT count(*) FROM recordings")
+    assert called(capsys, *query)[2] == ""
+    later = Path(lake.place("tables/recordings.parquet")).stat().st_mtime + 5
+    lakes.write_entry(lake, entry(7))
+    for folder in Path(lake.place(f"editions/{EDITION}")).iterdir():
+        os.utime(folder, (later, later))
+    code, _, said = called(capsys, *query)
+    assert (code, "results are newer than the tables" in said) == (0, True)
+    _, _, said = called(capsys, "campaign", "report", lake.uri, "--junit", tmp_path / "j.xml")
+    assert said.count("\n") == 1
+    lakes.write(lake, "head.json", {"edition": "f" * 12})
+    assert "the newest run is of edition ffffffffffff" in called(capsys, *query)[2]
+
+
+def test_a_query_of_a_store_looks_at_its_runs() -> None:
+    lake = lake_of("memory://behind", entries(2))
+    compact(lake)
+    assert behind(lake, EDITION) is None
+    lakes.write_text(lake, "runs/20260101T000000Z-0-1.jsonl", '{"uri": "a", "kept": true}\n')
+    assert behind(lake, EDITION) is None
+    lakes.write_text(lake, "runs/20260101T000000Z-1-1.jsonl", '{"uri": "a", "kept": false}\n')
+    assert "newer than the tables" in (behind(lake, EDITION) or "")

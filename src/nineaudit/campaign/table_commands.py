@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,7 @@ import typer
 
 from nineaudit.campaign.commands import campaign_app
 from nineaudit.options import example
+from nineaudit.progress import Show
 from nineaudit.units import counted
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ QueryFormat = StrEnum("QueryFormat", ["table", "csv", "json", "parquet"])
 DAMAGED = 3
 """Exit code where an entry of the lake cannot be used."""
 Ended = tuple[list[str], int]
+Telling = Callable[[Show, Show], int]
+"""What shows and says as it goes, and gives the exit code."""
 
 
 @campaign_app.command("compact", epilog=example("nineaudit campaign compact lake"))
@@ -67,7 +71,7 @@ def query(
     sql: Annotated[str, typer.Argument(metavar="SQL", help="One SELECT; it can change nothing and read nothing else.")],
     format: Annotated[QueryFormat | None, typer.Option(help="Default: a table, or by the suffix of --output.")] = None,
     output: Annotated[Path | None, typer.Option(metavar="F", help="Write the answer to this file.")] = None,
-) -> Ended:
+) -> Telling:
     """Ask the tables of a lake in SQL (DuckDB): recordings, findings, candidates, sensors, provenance."""
     from nineaudit.campaign import answers
     from nineaudit.campaign.compact import stored
@@ -76,14 +80,17 @@ def query(
     from nineaudit.outputs import write_text
 
     style = answers.style(format, output)
-    answer = select(stored(open_lake(lake)).tables, sql)
+    opened = open_lake(lake)
+    tables = stored(opened)
+    answer = select(tables.tables, sql)
     if output is None:
-        return [answers.as_text(answer, style, shutil.get_terminal_size((200, 24)).columns)], 0
+        shown = [answers.as_text(answer, style, shutil.get_terminal_size((200, 24)).columns)]
+        return _after(opened, tables.edition, shown)
     if style == "parquet":
         answers.write_parquet(answer, output)
     else:
         write_text(output, answers.as_text(answer, style) + "\n")
-    return [f"{output}: {counted(answer.num_rows, 'row')}"], 0
+    return _after(opened, tables.edition, [f"{output}: {counted(answer.num_rows, 'row')}"])
 
 
 @campaign_app.command(
@@ -117,7 +124,7 @@ def report(
         Path | None, typer.Option(metavar="F", help="Write the index: one page, a row a recording.")
     ] = None,
     junit: Annotated[Path | None, typer.Option(metavar="F", help="Write JUnit XML, a testcase a recording.")] = None,
-) -> Ended:
+) -> Telling:
     """Write the index page of a lake, and JUnit XML, from its tables (see `campaign compact`)."""
     from nineaudit.campaign import reporting
     from nineaudit.campaign.compact import stored
@@ -134,7 +141,22 @@ def report(
         reporting.write_index(opened, tables, html, _sensors(opened, tables.edition))
     if junit is not None:
         reporting.write_junit_file(opened, tables, junit)
-    return [str(path) for path in (html, junit) if path is not None], 0
+    return _after(opened, tables.edition, [str(path) for path in (html, junit) if path is not None])
+
+
+def _after(lake: Lake, edition: str, lines: list[str]) -> Telling:
+    """Show the lines; say where the tables are behind the results."""
+    from nineaudit.campaign.stale import behind
+
+    def tell(show: Show, say: Show) -> int:
+        late = behind(lake, edition)
+        if late is not None:
+            say(late)
+        for line in lines:
+            show(line)
+        return 0
+
+    return tell
 
 
 def _sensors(lake: Lake, edition: str) -> list[Section]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import date
 from typing import Final
 
@@ -12,12 +13,17 @@ from nineaudit.campaign.health.assess import Health, Member, State
 from nineaudit.campaign.health.words import amount, called, sentence, summary
 from nineaudit.campaign.index_page import Section
 from nineaudit.report.chart import Band, Chart, Level, Line
+from nineaudit.report.numbers import printable
 from nineaudit.units import counted
 
 CHARTS: Final = 12
 """Sensors with a chart of their own: the worst."""
 ROWS: Final = 2000
 """Sensors in the table: the worst."""
+APART: Final = 5
+"""Names that stand side by side below the strip of all sensors, on the screen of a phone too."""
+SIGNS: Final = 12
+"""Of a name there."""
 LEAST_TOLD: Final = 1.0
 """Tests whose own estimate is less certain than so many times the tolerance are not drawn."""
 
@@ -95,7 +101,6 @@ def _strip(health: Health) -> Chart:
     members = sorted((m for m in health.sensors if "gain" in m.level), key=lambda m: m.name)
     value, spread = (np.array([100.0 * m.level["gain"][i] for m in members]) for i in range(2))
     place = np.arange(len(members), dtype=np.float64)
-    named = [i for i, m in enumerate(members) if m.state is not State.IN_CONTROL][:CHARTS]
     return Chart(
         key="sensor-strip",
         title="Gain of every sensor now",
@@ -109,9 +114,25 @@ def _strip(health: Health) -> Chart:
         levels=_limits(0.0, health.tolerance),
         height=90,
         zooms=False,
-        across=tuple((float(i), members[i].name) for i in named) or ((0.0, members[0].name),),
+        across=_marks(members, health),
         across_label="sensor",
     )
+
+
+def _marks(members: Sequence[Member], health: Health) -> tuple[tuple[float, str], ...]:
+    """The worst by short names, as far apart as names are wide: a serial number, or the channel of the seat."""
+    kept: dict[int, str] = {}
+    for member in (m for m in health.sensors if "gain" in m.level):  # the worst first
+        place = members.index(member)
+        if member.state is not State.IN_CONTROL and all(abs(place - at) >= len(members) / APART for at in kept):
+            kept[place] = short(member)
+    return tuple((float(at), name) for at, name in sorted(kept.items())) or ((0.0, short(members[0])),)
+
+
+def short(member: Member) -> str:
+    """A name for an axis: of a sensor without a serial number its channel."""
+    name = member.name if member.serial or not member.seats else member.seats[0][1]
+    return printable(name if len(name) <= SIGNS else f"{name[: SIGNS - 1]}…")
 
 
 def _ticks(when: FloatArray, dated: bool) -> tuple[tuple[float, str], ...]:
