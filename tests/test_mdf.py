@@ -13,7 +13,7 @@ from nineaudit.errors import RecordingError
 from nineaudit.readers import read
 from nineaudit.readers.can.frames import key_counts
 from nineaudit.readers.can.mdf import read_mdf
-from nineaudit.rig import parse_rig
+from nineaudit.rig import load_rig, parse_rig
 
 asammdf = pytest.importorskip("asammdf")
 TIME = 0.001 * np.arange(50)
@@ -103,3 +103,23 @@ def test_real_logs_frame_by_frame(shared_data: Path, name: str, count: int) -> N
         fields = np.concatenate([part.samples["CAN_DataFrame.ID"].astype(np.int64) & 0x1FFFFFFF for part in parts])
     keys = {key & 0x1FFFFFFF: n for key, n in key_counts(log).items()}
     assert keys == dict(zip(*(x.tolist() for x in np.unique(fields, return_counts=True)), strict=True))
+
+
+def test_a_log_of_frames_is_opened_once(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened, folder, whole = [], shared_data / "canmod-imu", asammdf.MDF
+
+    def counted(path: Path, **options: Any) -> Any:
+        opened.append(path.name)
+        return whole(path, **options)
+
+    monkeypatch.setattr(asammdf, "MDF", counted)
+    rig = load_rig(Path(__file__).parents[1] / "fixtures" / "rigs" / "canmod-imu.toml")
+    found = read(folder / "drive-45s.mf4", rig, dbc=[folder / "canmod-gps.dbc"])
+    assert opened == ["drive-45s.mf4"]
+    assert found.source.counts["frames"] == 5477
+
+
+def test_a_unit_that_is_none_of_the_quantity_is_an_error_of_the_recording(tmp_path: Path) -> None:
+    path = written(tmp_path, ("A", [signal("one", TIME), signal("two", TIME, unit="V")]))
+    with pytest.raises(RecordingError, match=r"measured.mf4: signal two: unknown unit of acceleration; found 'V'"):
+        read(path, parse_rig(RIG.format(p="one", q="two")))

@@ -36,7 +36,12 @@ def read_mdf(path: Path) -> Frames:
     CAN frames.
     """
     with opened(path) as log:
-        found = _frames(log, path)
+        return frames_of(log, path)
+
+
+def frames_of(log: Any, path: Path) -> Frames:
+    """Frames of an open file. RecordingError where it holds no CAN frames."""
+    found = _frames(log, path)
     note = ("the logger did not finalise this file: frames after its end may be lost",) if unfinished(path) else ()
     return replace(found, notes=(*found.notes, *note))
 

@@ -12,7 +12,7 @@ import numpy as np
 from nineaudit.array import frozen
 from nineaudit.errors import RecordingError
 from nineaudit.identity import EARLIEST, Stated, began
-from nineaudit.readers.can.mdf import holds_frames, opened
+from nineaudit.readers.can.mdf import frames_of, holds_frames, opened
 from nineaudit.readers.can.reader import read_can
 from nineaudit.readers.contents import Contents
 from nineaudit.recording import Trace
@@ -30,8 +30,8 @@ def read_mf4(path: Path, rig: Rig) -> Contents:
     with opened(path) as log:
         if not holds_frames(log):
             return read_signals(log, path, rig)
-        about = _started(log, path)
-    return replace(read_can(path, rig), stated=about)
+        about, frames = _started(log, path), frames_of(log, path)
+    return replace(read_can(path, rig, frames), stated=about)
 
 
 def _started(log: Any, path: Path) -> tuple[Stated, ...]:

@@ -42,8 +42,9 @@ _DATES: Final = 10**15
 """Nanoseconds (11 days): first stamps beyond are dates."""
 
 
-def read_can(path: Path, rig: Rig) -> Contents:
-    """Signals (Message.Signal, or Signal alone where it is unique) of a log, with the units of the database.
+def read_can(path: Path, rig: Rig, frames: Frames | None = None) -> Contents:
+    """Signals (Message.Signal, or Signal alone where it is unique) of a log, with the units of the database. `frames`:
+    what it holds, where that was read already.
 
     A frame that is too short for its message or cannot be decoded is a reading that is not valid (NaN), and
     counted. Raises ConfigurationError: no database, unknown signal; RecordingError: no frames, or none of the
@@ -52,7 +53,7 @@ def read_can(path: Path, rig: Rig) -> Contents:
     databases = can_database.read_databases(rig.dbc)
     messages = databases.messages
     found = [can_database.find_signal(messages, sensor.signal) for sensor in rig.array.sensors]
-    log = FRAME_READERS[path.suffix.lower()](path)
+    log = FRAME_READERS[path.suffix.lower()](path) if frames is None else frames
     if not len(log):
         why = f": {'; '.join(map(str, log.damage))}" if log.damage else ""
         raise RecordingError(f"no CAN frames in this log{why}", file=path)
