@@ -7,6 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from campaign_entries import EDITION, entries, entry, lake_of
@@ -14,11 +16,15 @@ from campaigns import campaign
 from nineaudit import cli
 from nineaudit.campaign import entries as reading
 from nineaudit.campaign import lake as lakes
-from nineaudit.campaign import task
+from nineaudit.campaign import running, task
 from nineaudit.campaign.compact import compact
+from nineaudit.campaign.guard import NO_LIMITS
 from nineaudit.campaign.health.assess import Health, Member, State
 from nineaudit.campaign.health.page import section
+from nineaudit.campaign.source_tables import is_table, rows
+from nineaudit.campaign.sources import _unreadable, find
 from nineaudit.campaign.stale import behind
+from nineaudit.errors import ConfigurationError
 
 
 def called(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
@@ -143,3 +149,43 @@ def test_a_query_of_a_store_looks_at_its_runs() -> None:
     assert behind(lake, EDITION) is None
     lakes.write_text(lake, "runs/20260101T000000Z-1-1.jsonl", '{"uri": "a", "kept": false}\n')
     assert "newer than the tables" in (behind(lake, EDITION) or "")
+
+
+@pytest.mark.usefixtures("home")
+def test_what_lies_beside_recordings_is_none() -> None:
+    for name in ("README.txt", "ReadMe.csv", "SHA256SUMS.txt", "Thumbs.db", "daq.log", "sub/daq.log"):
+        Path("tests", name).parent.mkdir(exist_ok=True)
+        Path("tests", name).write_text("see the wiki\n", encoding="utf-8")
+
+    def found(source: str, *exclude: str) -> list[str]:
+        return sorted(Path(one.uri).name for one in find([source], lambda _: (), exclude=exclude))
+
+    assert found("tests") == ["T1.csv", "broken.csv", "daq.log", "daq.log"]
+    assert found("tests", "*.log", "broken*") == found("tests/*", "*.log", "tests/broken.csv") == ["T1.csv"]
+    assert found("tests/README.txt") == ["README.txt"], "what is named is audited"
+
+
+def test_a_folder_that_cannot_be_listed_is_told() -> None:
+    with pytest.raises(ConfigurationError, match="x: cannot be listed: Permission denied"):
+        _unreadable(PermissionError(13, "Permission denied", "x"))
+
+
+def test_a_table_of_a_spreadsheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("t.csv").write_text("\ufeffRecording;Number;Speed\nT1.csv;7;50\nT2.csv;;\n", encoding="utf-8")
+    assert is_table("t.csv")
+    assert [row for _, row in rows("t.csv")] == [
+        {"recording": "T1.csv", "number": "7", "Speed": "50"},
+        {"recording": "T2.csv"},
+    ]
+    whole = pa.table({"recording": ["T1.csv", "T2.csv"], "number": [4711.0, float("nan")]})
+    pq.write_table(whole, "t.parquet")
+    assert [row.get("number") for _, row in rows("t.parquet")] == ["4711", None]
+    Path("t.csv").write_text("recording,number\nT1.csv,7,8\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="row 1: a row with more cells than the header"):
+        list(rows("t.csv"))
+
+
+def test_a_worker_of_another_version_is_told() -> None:
+    with pytest.raises(ConfigurationError, match=r"another nineaudit; found '?0\.0\.0|expected '?0\.0\.0"):
+        running.perform({"uri": "T1.csv", "version": "0.0.0"}, NO_LIMITS, "none:none")

@@ -9,6 +9,7 @@ import uuid
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -41,6 +42,7 @@ class Plan:
     rig: str | None = None
     scheduler: str = running.LOCAL
     workers: int | None = None
+    exclude: tuple[str, ...] = ()
     shard: str | None = None
     resume: bool = False
     limits: Limits = NO_LIMITS
@@ -94,7 +96,7 @@ def _run(plan: Plan, show: progress.Show, say: progress.Show) -> int:
     task.require_reports(plan.reports)
     lake = _lake(plan)
     judged = Judged(plan, lake)
-    everything = list(find(plan.sources, judged.parts, without=lake.root))
+    everything = list(find(plan.sources, judged.parts, without=lake.root, exclude=plan.exclude))
     found = _of_shard(everything, plan.shard)
     lost = _unmatched(plan, everything)
     done = running.run(_requests(plan, judged, found), plan.scheduler, plan.workers, plan.limits, plan.function)
@@ -143,6 +145,7 @@ def _requests(plan: Plan, judged: Judged, found: Iterable[Found]) -> Iterator[Re
             "test": dict(one.test),
             "resume": plan.resume,
             "reports": plan.reports,
+            "version": version("nineaudit"),
         }
 
 

@@ -43,6 +43,9 @@ def run(
     workers: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Of a local run; default: one a core.")
     ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(metavar="GLOB", help="Not these files of folders: '*.log'; may be repeated.")
+    ] = None,
     shard: Annotated[str | None, typer.Option(metavar="I/N", help="Only part I of N, for job arrays.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Trust size and time of recordings that were read before.")
@@ -77,6 +80,7 @@ def run(
         rig=rig,
         scheduler=scheduler,
         workers=workers,
+        exclude=tuple(exclude or ()),
         shard=shard,
         resume=resume,
         limits=_limits(timeout, memory, retries),

@@ -12,6 +12,7 @@ import time
 import uuid
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -26,7 +27,10 @@ if TYPE_CHECKING:
     from nineaudit.campaign.task import Summary
 
 LOCAL: Final = "local"
+Suspect = tuple[Request, int]
+"""A request whose workers died, and how many of them."""
 _AHEAD: Final = 2
+
 """Tasks in flight for each thread of the workers: the next one is there when one ends."""
 _COUNTED: Final = 2.0
 """Seconds after which the workers are counted again: a cluster may grow."""
@@ -52,21 +56,31 @@ def run(
     again by Dask, at last alone, then written as not audited. ConfigurationError: no such scheduler; SchedulerLost.
     """
     with _client(scheduler, workers, limits) as client:
-        suspects: list[Request] = []
+        suspects: list[Suspect] = []
         yield from _windowed(client, scheduler, iter(requests), limits, function, suspects)
-        for request in suspects:  # one at a time: who dies now dies by its own recording
-            again: list[Request] = []
+        for request, _ in suspects:  # one at a time: who dies now dies by its own recording
+            again: list[Suspect] = []
             yield from _windowed(client, scheduler, iter([request]), limits, function, again)
-            for one in again:
-                reason = f"every worker that audited it died ({limits.retries + 1} of them, then as many again)"
-                yield {**give_up(one, reason), "attempts": 2 * (limits.retries + 1)}
+            for one, deaths in again:
+                reason = f"every worker that audited it died ({deaths} of them, then as many again)"
+                yield {**give_up(one, reason), "attempts": 2 * deaths}
 
 
 def perform(request: Request, limits: Limits, function: str) -> Summary:
     """On a worker: the request in a process of its own, and how long it took where."""
+    _require_version(request)
     began = time.perf_counter()
     done = guarded(request, limits, function)
     return {**done, "seconds": round(time.perf_counter() - began, 3), "host": socket.gethostname()}
+
+
+def _require_version(request: Request) -> None:
+    """ConfigurationError on a worker with another version: its entries would be of another edition."""
+    here, asked = version("nineaudit"), request.get("version")
+    if asked not in (None, here):
+        advice = "install the same version on the nodes of the cluster"
+        place = f"worker {socket.gethostname()}"
+        raise ConfigurationError("another nineaudit", place=place, found=here, expected=asked, advice=advice)
 
 
 def _windowed(
@@ -75,7 +89,7 @@ def _windowed(
     requests: Iterator[Request],
     limits: Limits,
     function: str,
-    suspects: list[Request],
+    suspects: list[Suspect],
 ) -> Iterator[Summary]:
     """The summaries; requests whose workers died are put to the `suspects`."""
     from distributed import KilledWorker, as_completed
@@ -99,7 +113,7 @@ def _windowed(
             continue
         error = future.exception() if future.status == "error" else None
         if isinstance(error, KilledWorker):
-            suspects.append(request)
+            suspects.append((request, error.allowed_failures + 1))
         elif error is not None:
             raise error
         else:

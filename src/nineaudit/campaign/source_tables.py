@@ -15,7 +15,9 @@ from nineaudit.errors import ConfigurationError
 
 TABLES: Final = (".csv", ".tsv", ".parquet", ".jsonl", ".ndjson")
 COLUMN: Final = "recording"
+KNOWN: Final = frozenset({COLUMN, "rig", "dbc", "number", "item", "date", "laboratory"})
 _HEAD: Final = 65536
+_WHOLE: Final = 2.0**53
 
 Row = dict[str, str]
 
@@ -37,7 +39,9 @@ def rows(uri: str) -> Iterator[tuple[str, Row]]:
         found = ", ".join(_columns(uri, suffix))
         raise ConfigurationError("has no column of recordings", file=uri, found=found, expected=f"a column {COLUMN}")
     for i, row in enumerate(_rows(uri, suffix), 1):
-        filled = {str(name).strip(): _text(value) for name, value in row.items() if _text(value)}
+        if None in row:
+            raise ConfigurationError("a row with more cells than the header", file=uri, place=f"row {i}")
+        filled = {_column(name): _text(value) for name, value in row.items() if _text(value)}
         if COLUMN not in filled:
             raise ConfigurationError("a row without a recording", file=uri, place=f"row {i}", expected=COLUMN)
         yield f"{name_of(uri)} row {i}", filled
@@ -45,9 +49,9 @@ def rows(uri: str) -> Iterator[tuple[str, Row]]:
 
 def _columns(uri: str, suffix: str) -> list[str]:
     if suffix == ".parquet":
-        return list(_parquet(uri).schema.names)
+        return [_column(name) for name in _parquet(uri).schema.names]
     lines = read_bytes(uri, "cannot be read")[:_HEAD].decode("utf-8-sig", "replace").splitlines()
-    return [name.strip() for name in next(csv.reader(lines[:1], delimiter=_separator(lines[:1], suffix)), [])]
+    return [_column(name) for name in next(csv.reader(lines[:1], delimiter=_separator(lines[:1], suffix)), [])]
 
 
 def _rows(uri: str, suffix: str) -> Iterator[Mapping[str, Any]]:
@@ -88,6 +92,12 @@ def _parquet(uri: str) -> Any:
         raise ConfigurationError(f"is no Parquet table: {error}", file=uri) from error
 
 
+def _column(name: str) -> str:
+    """A name of a column; those that are known are known in capitals too."""
+    plain = str(name).strip()
+    return plain.lower() if plain.lower() in KNOWN else plain
+
+
 def _separator(head: list[str], suffix: str) -> str:
     """Of a CSV table: a semicolon where the header has more of them than commas."""
     if suffix == ".tsv":
@@ -99,6 +109,8 @@ def _text(value: object) -> str:
     """A cell as text; dates as YYYY-MM-DD."""
     if value is None or (isinstance(value, float) and value != value):
         return ""
+    if isinstance(value, float) and value.is_integer() and abs(value) < _WHOLE:
+        return str(int(value))  # a column of whole numbers with an empty cell
     if isinstance(value, datetime) and not any((value.hour, value.minute, value.second, value.microsecond)):
         return value.date().isoformat()
     return value.isoformat() if isinstance(value, date) else str(value).strip()

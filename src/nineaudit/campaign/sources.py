@@ -1,7 +1,8 @@
 """Which recordings a campaign has: folders, globs, archives, tables, anywhere fsspec knows.
 
 - A folder, with the folders below it: every file that a reader knows by its suffix. Hidden files and folders are left
-  out, and lakes. A folder with a .mme file is one recording, named by that file.
+  out, lakes, and what lies beside recordings (BESIDE: README.txt). A folder with a .mme file is one recording, named
+  by that file.
 - A glob (``s3://bucket/2025/**/*.mf4``): of what it matches, the same.
 - A ZIP archive: with one .mme file it is one recording; else every file in it as of a folder (``zip://T1.csv::a.zip``).
 - A table (CSV, TSV, Parquet, JSON lines) with a column ``recording``: one row a recording. ``recording``, ``rig`` and
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from nineaudit.parts import Part
 
 _GLOB: Final = frozenset("*?[")
+BESIDE: Final = ("readme*", "license*.txt", "licence*.txt", "changelog*.txt", "*sums.txt", "thumbs.db")
+"""Names, in small letters, of what lies in a folder of recordings and is none, though its suffix is that of one."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +44,22 @@ class Found:
     place: str = ""
 
 
-def find(sources: Sequence[str], parts: Callable[[Found], Sequence[Part]], without: str = "") -> Iterator[Found]:
+def find(
+    sources: Sequence[str],
+    parts: Callable[[Found], Sequence[Part]],
+    without: str = "",
+    exclude: Sequence[str] = (),
+) -> Iterator[Found]:
     """The recordings of the sources, in their order, each once.
 
-    `parts` gives the parts of the rig of a recording. `without`: a lake, whose files are none.
+    `parts` gives the parts of the rig of a recording. `without`: a lake, whose files are none. `exclude`: patterns of
+    what is none in folders, globs and archives, by its name or by its path.
     ConfigurationError: a source that is not there or holds no recording, one named twice, a table that is wrong.
     """
     seen: dict[str, str] = {}
     for source in sources:
         count = 0
-        for found in _as_one(_of(source, without), parts):
+        for found in _as_one(_of(source, without, exclude), parts):
             count += 1
             if found.uri in seen:
                 first, second = seen[found.uri] or source, found.place or source
@@ -63,18 +73,18 @@ def find(sources: Sequence[str], parts: Callable[[Found], Sequence[Part]], witho
             )
 
 
-def _of(source: str, without: str) -> Iterator[Found]:
+def _of(source: str, without: str, exclude: Sequence[str]) -> Iterator[Found]:
     """What one source names."""
     protocol, path, rest = split(source)
     if _GLOB & set(path) and not _exists(source):
-        return _in_files(_matches(source), without)
+        return _in_files(_matches(source), without, exclude)
     if not _exists(source):
         raise ConfigurationError("no such file or folder", file=source)
     if not rest and is_table(source):
         return _in_table(source)
     if name_of(source).lower().endswith(".zip") and protocol != "zip://":
-        return _in_archive(source)
-    return _in_files(_below(source), without) if _is_folder(source) else iter([Found(source)])
+        return _in_archive(source, exclude)
+    return _in_files(_below(source), without, exclude) if _is_folder(source) else iter([Found(source)])
 
 
 def _as_one(found: Iterable[Found], parts: Callable[[Found], Sequence[Part]]) -> Iterator[Found]:
@@ -97,22 +107,31 @@ def _in_table(table: str) -> Iterator[Found]:
         yield Found(child(table, recording), child(table, rig) if rig else None, dbc, row, place)
 
 
-def _in_archive(archive: str) -> Iterator[Found]:
+def _in_archive(archive: str, exclude: Sequence[str]) -> Iterator[Found]:
     from nineaudit.readers import READERS
 
     inside = f"zip://::{archive}"
-    names = list(_below(inside))
+    names = [name for name in _below(inside) if not _left_out(name, exclude)]
     tests = [name for name in names if name_of(name).lower().endswith(".mme")]
     if len(tests) == 1 and not any(_suffix(name) in READERS and name not in tests for name in names):
         return iter([Found(archive)])
-    return _in_files(names, "")
+    return _in_files(names, "", exclude)
 
 
-def _in_files(names: Iterable[str], without: str) -> Iterator[Found]:
+def _left_out(uri: str, exclude: Sequence[str]) -> bool:
+    """Whether a file is no recording by its name: of those that lie beside recordings everywhere, or as asked."""
+    name, path = name_of(uri), split(uri)[1]
+    beside = any(fnmatchcase(name.lower(), one) for one in BESIDE)
+    return beside or any(fnmatchcase(name, one) or fnmatchcase(path, one) for one in exclude)
+
+
+def _in_files(names: Iterable[str], without: str, exclude: Sequence[str]) -> Iterator[Found]:
     """Those that are recordings."""
     from nineaudit.readers import READERS
 
     for name in names:
+        if _left_out(name, exclude):
+            continue
         if _suffix(name) in READERS and not (without and _absolute(name).startswith(f"{without}/")):
             yield Found(name)
 
@@ -124,13 +143,20 @@ def _suffix(uri: str) -> str:
 def _below(folder: str) -> Iterator[str]:
     """The files of a folder and of those below it, sorted; hidden ones and lakes left out."""
     fs, root = _opened(folder)
-    for home, folders, files in fs.walk(root):
+    for home, folders, files in fs.walk(root, on_error=_unreadable):
         if "lake.json" in files and "results" in folders:
             folders.clear()
             continue
         for name in [name for name in folders if name.startswith(".")]:
             _drop(folders, name)
         yield from (_named(folder, root, f"{home.rstrip('/')}/{name}") for name in sorted(files) if name[:1] != ".")
+
+
+def _unreadable(error: OSError) -> None:
+    """A folder that cannot be listed is not left out without a word; one that went meanwhile has nothing in it."""
+    if isinstance(error, FileNotFoundError):
+        return
+    raise ConfigurationError(f"cannot be listed: {error.strerror or error}", file=error.filename) from error
 
 
 def _drop(folders: Any, name: str) -> None:
