@@ -11,7 +11,9 @@ from scipy.stats import binom, chi2
 
 from health_campaigns import Plan, drawn, sensor_in
 from nineaudit.campaign.health.assess import State, assess, assess_records
-from nineaudit.campaign.health.model import Change, parts, solve
+from nineaudit.campaign.health.connect import parts
+from nineaudit.campaign.health.look import look
+from nineaudit.campaign.health.model import Change, solve
 from nineaudit.campaign.health.records import read_records
 from nineaudit.campaign.health.scan import scan, threshold
 from nineaudit.campaign.health.scatter import estimate_scatter
@@ -240,7 +242,7 @@ def test_the_statistic_of_a_change_is_standard_normal_without_one() -> None:
     for seed in range(30):
         records = drawn(Plan(rigs=1, channels=8, tests=48, scatter=0.3), 100 + seed).records.records
         (part,) = parts(records)
-        found = scan(solve(part, {("accelerometer", "gain"): 0.09}), len(records))
+        found = scan(look(solve(part, {("accelerometer", "gain"): 0.09})), len(records))
         values += [f.z for f in found]
     worst = np.abs(values)
     assert len(worst) == 240

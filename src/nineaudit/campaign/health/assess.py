@@ -10,10 +10,11 @@ from typing import Any, Final
 import numpy as np
 
 from nineaudit.array import FloatArray
+from nineaudit.campaign.health.connect import parts
+from nineaudit.campaign.health.crowd import LEAST_RECORDINGS, Track, tracks
 from nineaudit.campaign.health.deviations import Deviation, Key, deviations, key_of, seat_name
-from nineaudit.campaign.health.model import Solution, parts
+from nineaudit.campaign.health.model import Solution
 from nineaudit.campaign.health.records import UNIT, Records, Seat, family, read_records
-from nineaudit.campaign.health.scan import LEAST_RECORDINGS, Track, tracks
 from nineaudit.campaign.health.select import Selection, select
 from nineaudit.finding import COVERAGE_FACTOR
 
@@ -175,12 +176,10 @@ def _levels(mine: Sequence[int], solution: Solution) -> dict[str, tuple[float, f
     n = len(solution.part.unknowns)
     for i in mine:
         parameter = solution.part.unknowns[i].parameter
-        by = np.zeros(len(solution.x))
-        by[i] = 1.0
-        for k, change in enumerate(solution.changes):
-            by[n + k] = change.amount.max() if change.unknown == i else 0.0
-        unit, spread = UNIT[family(parameter)], float(np.sqrt(by @ solution.cov @ by))
-        out.setdefault(parameter, (unit * float(by @ solution.x), COVERAGE_FACTOR * unit * spread))
+        its = {n + k: float(c.amount.max()) for k, c in enumerate(solution.changes) if c.unknown == i}
+        at, by = [i, *its], np.array([1.0, *its.values()])
+        unit, spread = UNIT[family(parameter)], float(np.sqrt(by @ solution.cov[np.ix_(at, at)] @ by))
+        out.setdefault(parameter, (unit * float(by @ solution.x[at]), COVERAGE_FACTOR * unit * spread))
     return out
 
 

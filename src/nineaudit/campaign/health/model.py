@@ -10,22 +10,28 @@ the rig's variance is half the sensor's, half the seat's. w: mounting and temper
     Λ'_j = Λ_j − Λ_j (Λ_j + T⁻¹)⁻¹ Λ_j,    η'_j = η_j − Λ_j (Λ_j + T⁻¹)⁻¹ η_j                    (Woodbury)
     H = P⁻¹ + Σ A_jᵀ Λ'_j A_j,    H x = Σ A_jᵀ η'_j                      (least squares, Lindley & Smith 1972)
 
-Sensors that no chain of rigs connects are solved apart (parts). A recording needs 8 p² bytes, p errors of its channels.
+Sensors that no chain of rigs connects are solved apart (connect.py). A recording needs 16 p² bytes, p errors of its
+channels.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
-from nineaudit.campaign.health.records import Record, Row, Seat, family
+from nineaudit.campaign.health.normal import inverse
+from nineaudit.campaign.health.records import Row, Seat, family
 
 ANY_CHANGE: Final = 1e5
 """Prior standard deviation of a change, in records.UNIT: of one that no recording shows, 0 is as good as any."""
+
+AT_ONCE: Final = 128
+"""Recordings whose w is integrated out together: memory."""
 
 Scatter = dict[tuple[str, str], float]
 """Kind and family of an error -> variance from test to test, in records.UNIT squared."""
@@ -79,6 +85,15 @@ class Part:
         groups = (g.take(np.flatnonzero(np.isin(g.index, wanted))) for g in self.groups)
         return Part(tuple(g for g in groups if len(g.index)), self.unknowns, self.prior)
 
+    @cached_property
+    def rigs(self) -> tuple[IntArray, ...]:
+        """The unknowns of the seats of each rig: no recording connects those of two."""
+        seats: dict[str, list[int]] = {}
+        for i, unknown in enumerate(self.unknowns):
+            if unknown.seat is not None:
+                seats.setdefault(unknown.seat[0], []).append(i)
+        return tuple(np.array(mine, dtype=np.intp) for mine in seats.values())
+
 
 @dataclass(frozen=True, eq=False)
 class Change:
@@ -116,87 +131,23 @@ class Solution:
         return np.asarray(marginal.eta - (marginal.matrix @ theta[:, :, None])[:, :, 0])
 
 
-def parts(records: Sequence[Record]) -> list[Part]:
-    """The records by what connects them."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    by_rows: dict[tuple[Row, ...], list[int]] = {}
-    keys: dict[tuple[object, ...], list[int]] = {}
-    for i, record in enumerate(records):
-        key = tuple((r.sensor, r.seat, r.kind, r.parameter, r.axis) for r in record.rows)
-        keys.setdefault(key, []).append(i)
-    for members in keys.values():
-        by_rows[records[members[0]].rows] = members
-    number: dict[Unknown, int] = {}
-    prior: list[float] = []
-    touched = [_touched(rows, number, prior) for rows in by_rows]
-    edges = [(t[0][0], a) for t in touched for pair in t for a in pair]
-    first, second = np.array(edges, dtype=np.intp).reshape(-1, 2).T
-    graph = coo_array((np.ones(len(edges)), (first, second)), shape=(len(number),) * 2)
-    count, label = connected_components(graph, directed=False)
-    unknowns, sizes = list(number), np.array(prior)
-    made = []
-    for part in range(count):
-        mine = np.flatnonzero(label == part)
-        place = {int(u): i for i, u in enumerate(mine)}
-        groups = tuple(
-            _group(rows, [records[i] for i in members], members, t, place)
-            for (rows, members), t in zip(by_rows.items(), touched, strict=True)
-            if t[0][0] in place
-        )
-        made.append(Part(groups, tuple(unknowns[u] for u in mine), sizes[mine]))
-    return made
-
-
-def _touched(rows: tuple[Row, ...], number: dict[Unknown, int], prior: list[float]) -> list[tuple[int, ...]]:
-    """The unknowns of each row; new ones are numbered."""
-    out = []
-    for row in rows:
-        of = {"gain": (True, False), "tilt": (True, True), "position": (False, True)}[family(row.parameter)]
-        mine = [Unknown(row.parameter, row.sensor, None, row.axis)] if of[0] else []
-        mine += [Unknown(row.parameter, None, row.seat)] if of[1] else []
-        for unknown in mine:
-            if number.setdefault(unknown, len(number)) == len(prior):
-                prior.append(row.prior / np.sqrt(len(mine)))
-        out.append(tuple(number[u] for u in mine))
-    return out
-
-
-def _group(
-    rows: tuple[Row, ...],
-    records: Sequence[Record],
-    members: Sequence[int],
-    touched: Sequence[tuple[int, ...]],
-    place: dict[int, int],
-) -> Group:
-    at = sorted({place[u] for pair in touched for u in pair})
-    design = np.zeros((len(rows), len(at)))
-    for i, pair in enumerate(touched):
-        for u in pair:
-            design[i, at.index(place[u])] = 1.0
-    return Group(
-        rows,
-        np.array(members, dtype=np.intp),
-        np.array([r.when for r in records]),
-        np.stack([r.eta for r in records]),
-        np.stack([r.matrix for r in records]),
-        np.array(at, dtype=np.intp),
-        design,
-        np.array([[r.shock.get(row.sensor, 0.0) for row in rows] for r in records]),
-    )
-
-
 def marginal(group: Group, tau: Scatter) -> Marginal:
     """The group with w integrated out; symmetric form, so that Λ may be singular and T may be 0."""
     root = np.sqrt(group.scatter(tau))
-    right = root[:, None] * np.concatenate([group.matrix, group.eta[:, :, None]], axis=2)
+    eta, matrix = np.empty_like(group.eta), np.empty_like(group.matrix)
+    for start in range(0, len(eta), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
+        eta[some], matrix[some] = _without_scatter(group.eta[some], group.matrix[some], root)
+    return Marginal(group, eta, matrix)
+
+
+def _without_scatter(eta: FloatArray, matrix: FloatArray, root: FloatArray) -> tuple[FloatArray, FloatArray]:
+    right = root[:, None] * np.concatenate([matrix, eta[:, :, None]], axis=2)
     inner = np.eye(len(root)) + right[:, :, :-1] * root
     gone = np.linalg.solve(inner, right)
-    across = group.matrix * root
-    matrix = group.matrix - across @ gone[:, :, :-1]
-    eta = group.eta - (across @ gone[:, :, -1:])[:, :, 0]
-    return Marginal(group, eta, 0.5 * (matrix + matrix.transpose(0, 2, 1)))
+    across = matrix * root
+    left = matrix - across @ gone[:, :, :-1]
+    return eta - (across @ gone[:, :, -1:])[:, :, 0], 0.5 * (left + left.transpose(0, 2, 1))
 
 
 def moves(group: Group, changes: Sequence[Change]) -> list[tuple[int, FloatArray]]:
@@ -226,5 +177,26 @@ def solve(part: Part, tau: Scatter, changes: Sequence[Change] = ()) -> Solution:
             right[n + k] += float(np.sum(column * one.eta))
             for other, theirs in columns:
                 normal[n + other, n + k] += float(np.sum(theirs * told))
-    cov = np.linalg.inv(normal)
+    cov = inverse(normal, part.rigs)
     return Solution(part, tuple(changes), marginals, cov @ right, 0.5 * (cov + cov.T))
+
+
+def with_change(solution: Solution, change: Change) -> Solution:
+    """The solution with one change more: its equation borders the others, the inverse changes by rank one."""
+    n, size = len(solution.part.unknowns), len(solution.x)
+    across, own, right = np.zeros(size), ANY_CHANGE**-2.0, 0.0
+    for one in solution.marginals:
+        for _, column in moves(one.group, [change]):
+            told = (one.matrix @ column[:, :, None])[:, :, 0]
+            across[one.group.at] += one.group.design.T @ told.sum(axis=0)
+            own += float(np.sum(column * told))
+            right += float(np.sum(column * one.eta))
+            for k, theirs in moves(one.group, solution.changes):
+                across[n + k] += float(np.sum(theirs * told))
+    by = np.append(-solution.cov @ across, 1.0)
+    left = own + float(across @ by[:-1])
+    far = (right - float(across @ solution.x)) / left
+    cov = np.outer(by, by / left)
+    cov[:size, :size] += solution.cov
+    changes = (*solution.changes, change)
+    return Solution(solution.part, changes, solution.marginals, np.append(solution.x, 0.0) + far * by, cov)

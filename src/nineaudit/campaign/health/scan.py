@@ -15,51 +15,30 @@ Where readings scatter more than the model says, as successive ones tell (von Ne
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cache
 from statistics import NormalDist
 from typing import Final
 
 import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
-from nineaudit.campaign.health.model import Change, Marginal, Solution, moves
+from nineaudit.campaign.health.crowd import BINS, LEAST_INFORMATION, LEAST_RECORDINGS, Track, track
+from nineaudit.campaign.health.look import Look, Sight
+from nineaudit.campaign.health.model import Change
 
-BINS: Final = 50
-LEAST_SIDE: Final = 3
-"""Recordings on each side of a step."""
-LEAST_RECORDINGS: Final = 6
 FALSE_ALARM: Final = 1e-3
 """Probability that a sensor without a change is accused in a campaign."""
 PER_SENSOR: Final = 8
 """Unknowns of a sensor and its seat: gain, two tilts each, three positions."""
 SHAPES: Final = 2 * BINS
 """At most: steps at 49 places, ramps from 48, two shapes of shock history."""
-LEAST_INFORMATION: Final = 1e-6
 
 
 def threshold() -> float:
     """|Z| above which a change is significant: Bonferroni over all shapes of all unknowns of a sensor, two-sided."""
     return NormalDist().inv_cdf(1.0 - FALSE_ALARM / (2.0 * PER_SENSOR * SHAPES))
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """The recordings of one unknown in order of time: `index` (J,), `when` (J,), `shock` (J,), `z` (J,) standardised
-    score of each, `bin` (J,), and by bin the score `r` (B,), information `info` (B,), coupling `g` (B,m) with the
-    entries `at` (m,) of the solution."""
-
-    unknown: int
-    index: IntArray
-    when: FloatArray
-    shock: FloatArray
-    z: FloatArray
-    weight: FloatArray
-    bin: IntArray
-    r: FloatArray
-    info: FloatArray
-    g: FloatArray
-    at: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,140 +58,85 @@ class Found:
     track: Track
 
 
-def scan(solution: Solution, size: int) -> list[Found]:
-    """The best change of every unknown with recordings enough, largest |Z| first. `size`: recordings of the
-    campaign."""
-    found = (best(track, solution, size) for track in tracks(solution))
-    return sorted((f for f in found if f is not None), key=lambda f: -abs(f.z))
-
-
-def tracks(solution: Solution) -> Iterator[Track]:
-    """Every unknown with recordings enough."""
+def scan(seen: Look, size: int, without: Collection[int] = (), margin: float = np.inf) -> list[Found]:
+    """The best change of every unknown that is seen, but those `without`, largest |Z| first and while Z² is within
+    `margin` of it. `size`: recordings of the campaign."""
+    solution = seen.solution
     residuals = [solution.residual(one) for one in solution.marginals]
-    for unknown in range(len(solution.part.unknowns)):
-        pairs = zip(solution.marginals, residuals, strict=True)
-        mine = [_piece(unknown, one, residual) for one, residual in pairs if unknown in one.group.at]
-        if sum(len(piece.index) for piece in mine) >= LEAST_RECORDINGS:
-            yield _track(unknown, mine, solution)
+    ranked = [one for sight in seen.sights for one in _best(sight, residuals) if one.unknown not in without]
+    ranked.sort(key=lambda one: (-abs(one.z[one.top]), one.unknown))
+    return [_found(one, size) for one in ranked if ranked[0].z[ranked[0].top] ** 2 - one.z[one.top] ** 2 < margin]
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """What one group says of an unknown: `index`, `when`, `shock`, score `r` and information `info` (J,), and `told`
-    (J,p) what its recordings say of it with every other error."""
+class Best:
+    """The largest |Z| of an unknown: the `place` of it in the crowd of `sight`, the shape `top` of all `z` (S,), the
+    score of it, and `each` (J,) recording's own."""
 
-    marginal: Marginal
-    index: IntArray
-    when: FloatArray
-    shock: FloatArray
-    r: FloatArray
-    info: FloatArray
-    told: FloatArray
-
-
-def _piece(unknown: int, one: Marginal, residual: FloatArray) -> Piece:
-    group = one.group
-    rows = np.flatnonzero(group.design[:, np.flatnonzero(group.at == unknown)[0]])
-    told = one.matrix[:, rows].sum(axis=1)
-    info, r = told[:, rows].sum(axis=1), residual[:, rows].sum(axis=1)
-    return Piece(one, group.index, group.when, group.shock[:, rows[0]], r, info, told)
+    unknown: int
+    sight: Sight
+    place: int
+    top: int
+    z: FloatArray
+    score: float
+    each: FloatArray
 
 
-def _coupled(piece: Piece, bins: IntArray, count: int, solution: Solution) -> tuple[FloatArray, list[int]]:
-    """(B,m) by bin, and which entries of the solution (m,)."""
-    group, n = piece.marginal.group, len(solution.part.unknowns)
-    member = np.zeros((count, len(bins)))
-    member[bins, np.arange(len(bins))] = 1.0
-    columns = moves(group, solution.changes)
-    changed = [member @ (piece.told * column).sum(axis=1) for _, column in columns]
-    by_bin = np.column_stack([member @ piece.told @ group.design, *changed])
-    return by_bin, [*group.at.tolist(), *(n + k for k, _ in columns)]
+def _best(sight: Sight, residuals: list[FloatArray]) -> list[Best]:
+    """Of the unknowns of a crowd of which some shape can be told from what else is unknown."""
+    crowd = sight.crowd
+    scores = crowd.scores(residuals)
+    starts = np.searchsorted(crowd.bin, np.arange(crowd.bins))
+    score = sight.shapes.applied(np.add.reduceat(scores, starts, axis=1))
+    seen = sight.info > LEAST_INFORMATION * np.maximum(sight.plain, 1.0)
+    each = crowd.standardised(scores)
+    wider = np.array([_excess(*one) for one in zip(each, crowd.weight, strict=True)])
+    z = np.where(seen, score / np.sqrt(np.where(seen, sight.info, 1.0)), 0.0) / wider[:, None]
+    tops = np.argmax(np.abs(z), axis=1)
+    return [
+        Best(int(crowd.unknowns[i]), sight, i, int(tops[i]), z[i], float(score[i, tops[i]]), each[i])
+        for i in np.flatnonzero(seen.any(axis=1)).tolist()
+    ]
 
 
-def _track(unknown: int, pieces: Sequence[Piece], solution: Solution) -> Track:
-    index = np.concatenate([p.index for p in pieces])
-    order = np.argsort(index)
-    rank = np.empty(len(index), dtype=np.intp)
-    rank[order] = np.arange(len(index))
-    bins = rank * min(BINS, len(index)) // len(index)
-    count = int(bins.max()) + 1
-    cuts = np.cumsum([len(p.index) for p in pieces])[:-1]
-    by_piece = [_coupled(p, b, count, solution) for p, b in zip(pieces, np.split(bins, cuts), strict=True)]
-    at = np.unique([place for _, places in by_piece for place in places])
-    coupling = np.zeros((count, len(at)))
-    for values, places in by_piece:
-        coupling[:, np.searchsorted(at, places)] += values
-    bins = bins[order]
-    when, shock = (np.concatenate([getattr(p, name) for p in pieces])[order] for name in ("when", "shock"))
-    r, info = (np.concatenate([getattr(p, name) for p in pieces])[order] for name in ("r", "info"))
-    z = r / np.sqrt(np.maximum(info, LEAST_INFORMATION))
-    by_bin, info_by_bin = (np.asarray(np.bincount(bins, v, count), dtype=np.float64) for v in (r, info))
-    return Track(unknown, index[order], when, shock, z, info, bins, by_bin, info_by_bin, coupling, at)
-
-
-def shapes(track: Track) -> tuple[list[tuple[str, int]], FloatArray]:
-    """Name and first bin of every shape, and (S,B) their values, 0 to 1."""
-    count = len(track.r)
-    sizes, bins = np.bincount(track.bin, minlength=count), np.arange(count)
-    when = np.bincount(track.bin, track.when, count) / sizes
-    before = np.cumsum(sizes) - sizes
-    steps = np.flatnonzero(np.minimum(before, len(track.bin) - before) >= LEAST_SIDE)
-    ramps = np.flatnonzero((bins < count - 2) & (len(track.bin) - before >= 2 * LEAST_SIDE) & (when < when[-1]))
-    names = [("step", int(k)) for k in steps] + [("ramp", int(k)) for k in ramps]
-    rising = (when - when[ramps, None]) / (when[-1] - when[ramps, None])
-    rows = [*(bins >= steps[:, None]).astype(np.float64), *np.clip(rising, 0.0, 1.0)]
-    hardest = np.concatenate([[0.0], np.maximum.accumulate(track.shock)[:-1]])
-    histories = (("count", np.arange(len(track.bin), dtype=np.float64)), ("worst", hardest))
-    for name, history in histories:
-        if history[-1] > 0.0:
-            names.append((name, 0))
-            rows.append(np.bincount(track.bin, history / history[-1], count) / sizes)
-    return names, np.array(rows).reshape(-1, count)
-
-
-def best(track: Track, solution: Solution, size: int) -> Found | None:
-    """The shape with the largest |Z|; None where no shape can be told from what else is unknown."""
-    names, values = shapes(track)
-    cov = solution.cov[np.ix_(track.at, track.at)]
-    hidden = track.g @ cov @ track.g.T
-    plain = values**2 @ track.info
-    info = plain - np.einsum("sb,bc,sc->s", values, hidden, values)
-    seen = info > LEAST_INFORMATION * np.maximum(plain, 1.0)
-    if not seen.any():
-        return None
-    score = values @ track.r
-    z = np.where(seen, score / np.sqrt(np.where(seen, info, 1.0)), 0.0) / excess(track)
-    top = int(np.argmax(np.abs(z)))
+def _found(one: Best, size: int) -> Found:
+    sight, crowd, z, top = one.sight, one.sight.crowd, one.z, one.top
+    names = sight.shapes.names
     near = [k for k, (name, _) in enumerate(names) if name == names[top][0] and z[top] ** 2 - z[k] ** 2 < 3.84]
-    first, earliest = (int(track.index[np.searchsorted(track.bin, names[k][1])]) for k in (top, min(near)))
-    latest = int(track.index[np.searchsorted(track.bin, names[max(near)][1], side="right") - 1])
+    first, earliest = (int(crowd.index[np.searchsorted(crowd.bin, names[k][1])]) for k in (top, min(near)))
+    latest = int(crowd.index[np.searchsorted(crowd.bin, names[max(near)][1], side="right") - 1])
     amount = np.zeros(size)
-    amount[track.index] = values[top][track.bin]
+    amount[crowd.index] = sight.shapes.values(one.place, top)[crowd.bin]
     return Found(
-        track.unknown,
+        one.unknown,
         names[top][0],
         first,
         earliest,
         latest,
         float(z[top]),
-        float(score[top] / info[top]),
+        one.score / float(sight.info[one.place, top]),
         amount,
-        track,
+        track(crowd, one.place, one.each),
     )
 
 
 def excess(track: Track) -> float:
     """Scatter of successive estimates over what the model says, 1 at least: a change is in few of the differences."""
-    told = track.weight > LEAST_INFORMATION
+    return _excess(track.z, track.weight)
+
+
+def _excess(z: FloatArray, weight: FloatArray) -> float:
+    told = weight > LEAST_INFORMATION
     if told.sum() < 2 * LEAST_RECORDINGS:
         return 1.0
-    variance = 1.0 / track.weight[told]
-    estimate = track.z[told] * np.sqrt(variance)
+    variance = 1.0 / weight[told]
+    estimate = z[told] * np.sqrt(variance)
     steps = np.diff(estimate) ** 2 / (variance[1:] + variance[:-1])
     few = max(len(steps) // 25, 2)  # a bad test is in two differences; it is left to outlying()
     return float(np.sqrt(max(np.sort(steps)[:-few].mean() / _trimmed(few / len(steps)), 1.0)))
 
 
+@cache
 def _trimmed(part: float) -> float:
     """Mean of the squares of a standard normal without its largest `part`."""
     limit = NormalDist().inv_cdf(1.0 - part / 2.0)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import log
 from typing import Final
 
+from nineaudit.campaign.health.look import look, look_again
 from nineaudit.campaign.health.model import Change, Part, Scatter, Solution, solve
 from nineaudit.campaign.health.scan import Found, change, outlying, scan, threshold
 from nineaudit.campaign.health.scatter import estimate_scatter
@@ -63,19 +64,21 @@ def select(parts: Sequence[Part], size: int) -> Selection:
 
 def _grown(part: Part, changes: list[Selected], out: list[int], scatter: Scatter, size: int) -> tuple[Part, Solution]:
     """The part with every significant change added to `changes`, without the recordings added to `out`."""
+    seen = look(solve(part, scatter, _shapes(changes)))
     while True:
-        solution = solve(part, scatter, _shapes(changes))
-        known = {one.unknown for one in solution.changes}
-        ranked = [f for f in scan(solution, size) if f.unknown not in known]
+        known = {one.unknown for one in seen.solution.changes}
+        ranked = scan(seen, size, known, MARGIN)
         if not ranked or abs(ranked[0].z) < threshold() or len(changes) >= MOST_CHANGES:
-            return part, solution
+            return part, seen.solution
         best = ranked[0]
         bad = outlying(best) if len(out) < MOST_OUTLYING else ()
         if len(bad):
             out.extend(int(b) for b in bad)
             part = part.take(_indices(part) - set(out))
+            seen = look(solve(part, scatter, _shapes(changes)))
         else:
-            changes.append(Selected(best, tuple(f for f in ranked[1:] if best.z**2 - f.z**2 < MARGIN)))
+            changes.append(Selected(best, tuple(ranked[1:])))
+            seen = look_again(seen, change(best))
 
 
 def _shapes(changes: Sequence[Selected]) -> list[Change]:
