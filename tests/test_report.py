@@ -437,7 +437,7 @@ def test_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pytes
     def refuse(_: Path, target: Path) -> None:
         raise PermissionError(str(target))
 
-    monkeypatch.setattr(Path, "replace", refuse)
+    monkeypatch.setattr("os.replace", refuse)
     with pytest.raises(PermissionError):
         report.write_report(example(201), path)
     assert path.read_text() == "old"

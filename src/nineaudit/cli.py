@@ -21,12 +21,9 @@ import typer
 from nineaudit import compare_command, motion_command, options, plain_text, progress, verify_command
 from nineaudit.calibrate import calibrate_app
 from nineaudit.campaign.commands import campaign_app
-from nineaudit.errors import NineauditError
+from nineaudit.errors import NineauditError, last_words
 from nineaudit.options import Dbc, Force, Log, Output, Recording, Recordings, RigFile, RigOption, Rules, example, group
 from nineaudit.reference import rig_app, rules_app
-
-DEFECT = 70
-"""Exit code of an error that is not the user's (EX_SOFTWARE of sysexits.h)."""
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C (128 + SIGINT)."""
@@ -284,9 +281,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except Exception as error:  # the last place that can turn a defect into a sentence
         if debug:
             raise
-        said = f"{type(error).__name__}: {error}"
-        _say(f"a defect of nineaudit: {said}; run it again with --debug, and report what it shows")
-        sys.exit(DEFECT)
+        said, code = last_words(error)
+        _say(said)
+        sys.exit(code)
     sys.exit(0)
 
 

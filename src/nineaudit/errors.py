@@ -5,6 +5,7 @@ One sentence reaches the user: ``file: place: what is wrong; found X; expected Y
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 _MISSING = object()
@@ -63,3 +64,17 @@ class EstimationError(NineauditError):
 
     The engine turns it into a NOT_EVALUATED finding with this reason; it never counts as a pass.
     """
+
+
+DEFECT = 70
+"""Exit code of an error that is not the user's (EX_SOFTWARE of sysexits.h)."""
+REFUSALS = (errno.EACCES, errno.EPERM, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOSPC, errno.EROFS)
+"""What a system answers to a path that it does not let us use: no defect of ours."""
+
+
+def last_words(error: Exception) -> tuple[str, int]:
+    """What is said of an error that nothing else spoke of, and the exit code."""
+    if isinstance(error, OSError) and error.errno in REFUSALS:
+        return f"{error.filename}: {error.strerror}", ConfigurationError.exit_code
+    said = f"a defect of nineaudit: {type(error).__name__}: {error}"
+    return f"{said}; run it again with --debug, and report what it shows", DEFECT

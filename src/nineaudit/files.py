@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import IO, Any
 
 _WINDOWS = os.name == "nt"
+_LONG = 200
+"""Bytes of a name to which a process id can be added."""
 
 
 def sha256(path: Path) -> str:
@@ -38,8 +40,11 @@ def _content(document: Mapping[str, Any]) -> str:
 
 
 def partial_name(path: Path) -> Path:
-    """Where a file is written before it takes its name: hidden, in the same folder, of the same suffix."""
-    return path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    """Where a file is written before it takes its name: hidden, in the same folder, of the same suffix; a name that
+    fills what systems allow (255 bytes) is told by its hash."""
+    long = len(os.fsencode(path.name)) > _LONG
+    stem = hashlib.sha256(os.fsencode(path.stem)).hexdigest()[:32] if long else path.stem
+    return path.with_name(f".{stem}.{os.getpid()}{path.suffix}")
 
 
 def write_whole(path: Path, text: str) -> None:

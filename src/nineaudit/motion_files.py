@@ -20,6 +20,7 @@ import numpy as np
 from nineaudit import motion_can
 from nineaudit.array import FloatArray
 from nineaudit.errors import ConfigurationError
+from nineaudit.files import partial_name
 from nineaudit.motion import Kinematics
 from nineaudit.presets import nearest
 from nineaudit.signals import MCAP_ORIGIN
@@ -69,7 +70,7 @@ def write_motion(found: Kinematics, path: Path, force: bool = False) -> tuple[st
             raise ConfigurationError(
                 "the file exists", file=place, advice="choose another name, or overwrite it with --force"
             )
-    partial = [place.with_name(f".{place.stem}.{os.getpid()}{place.suffix}") for place in places]
+    partial = [partial_name(place) for place in places]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         notes = writer(found, partial[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -15,7 +16,7 @@ STEM: Final = "{stem}"
 
 def each_its_own(pattern: str) -> bool:
     """Whether an output option names a file for each recording: a folder, or ``{stem}`` in the name."""
-    return STEM in pattern or pattern.endswith(("/", "\\")) or Path(pattern).is_dir()
+    return STEM in pattern or pattern.endswith(("/", "\\")) or os.path.isdir(pattern)
 
 
 def places(pattern: str, recordings: Sequence[Path], option: str, suffix: str) -> tuple[Path, ...]:

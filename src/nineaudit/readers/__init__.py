@@ -7,6 +7,7 @@ the container held. It holds no physics; what it drops it counts.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -156,7 +157,7 @@ def _provenance(path: Path, sha256: str, contents: Contents) -> tuple[Provenance
 
 
 def _reader(path: Path) -> Reader:
-    if path.is_dir():
+    if os.path.isdir(path):  # False also for what the system will not look at; opening it says why
         if mme_files.is_test(path):
             return read_mme
         raise RecordingError("is a folder, not a recording", file=path, advice="name the files in it")

@@ -8,14 +8,13 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
-import os
-import tempfile
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nineaudit.files import write_whole
 from nineaudit.finding import Verdict
 from nineaudit.report import annex, hypotheses, mended, method, origin, review, tables, tested
 from nineaudit.report.channels import gallery
@@ -62,16 +61,7 @@ LEAD = {
 def write_report(audit: Audit, path: str | Path) -> Path:
     """Write the report of `audit` to `path`, whole or not at all. OSError where the place cannot be written."""
     path = Path(path)
-    data = render(audit).encode("utf-8")
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    part = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        part.chmod(0o644)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    write_whole(path, render(audit))
     return path
 
 
