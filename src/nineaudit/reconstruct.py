@@ -140,6 +140,9 @@ def left_out(case: Case, data: Data, column: int) -> Fit:
     It starts from what the other channels tell of ω, and, if that leads nowhere, from the fit with all channels.
     """
     alone = masked(data, column)
+    if alone.dof < 0:
+        channel = case.array.channels[column]
+        raise EstimationError(f"the motion is not determined without {channel}: more unknowns than readings are left")
     starts: tuple[Callable[[], FloatArray], ...] = (
         lambda: first_omega(masked(case.fit_data, column)),
         lambda: case.healthy.omega,
