@@ -103,3 +103,10 @@ def test_a_full_device_is_said_and_stays_a_device(
     assert "No space left on device" in said
     assert link.is_symlink()
     assert Path("/dev/full").is_char_device()
+
+
+def test_a_link_to_itself_is_no_defect(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "loop.html").symlink_to("loop.html")
+    found, said = run(capsys, "check", "T1.csv", "--rig", "rig.toml", "--html", "loop.html")
+    assert (found, "defect" in said) == (0, False)
+    assert (folder / "loop.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")

@@ -61,7 +61,7 @@ def written_whole(path: Path) -> Iterator[Callable[[str], None]]:
     A link stays and what it points to is written; a device or a pipe is written to as it is. OSError where the folder
     cannot be written to.
     """
-    path = path.resolve() if path.is_symlink() else path
+    path = Path(os.path.realpath(path)) if path.is_symlink() else path
     special = path.exists() and not path.is_file()
     partial = path if special else partial_name(path)
     try:

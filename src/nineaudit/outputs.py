@@ -106,4 +106,5 @@ def unwritable(path: Path, error: OSError) -> ConfigurationError:
 
 
 def _same(a: Path, b: Path) -> bool:
-    return a.resolve() == b.resolve() or (a.exists() and b.exists() and a.samefile(b))
+    there = os.path.exists(a) and os.path.exists(b)
+    return os.path.realpath(a) == os.path.realpath(b) or (there and a.samefile(b))
