@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 FailOn = StrEnum("FailOn", ["error", "warning", "never"])
 Reports = StrEnum("Reports", ["failed", "all", "none"])
+Exclude = Annotated[
+    list[str] | None, typer.Option(metavar="GLOB", help="Not these files of folders: '*.log'; may be repeated.")
+]
 _SOURCES = (
     "Folders, globs, ZIP archives, tables with a column `recording`, recordings; s3:// and all that fsspec knows."
 )
@@ -43,9 +46,7 @@ def run(
     workers: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Of a local run; default: one a core.")
     ] = None,
-    exclude: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Not these files of folders: '*.log'; may be repeated.")
-    ] = None,
+    exclude: Exclude = None,
     shard: Annotated[str | None, typer.Option(metavar="I/N", help="Only part I of N, for job arrays.")] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Trust size and time of recordings that were read before.")
