@@ -145,6 +145,8 @@ def test_legible(opened: Opener, scheme: str, width: int) -> None:
     assert page.evaluate(CONTRAST) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert all(chart[0] <= width for chart in page.evaluate(INK))
+    ends = page.locator("caption").evaluate_all("all => all.map(c => c.getBoundingClientRect().right)")
+    assert max(ends) <= width  # to be read without scrolling the table
 
 
 def test_dark_is_dark(opened: Opener) -> None:
