@@ -174,3 +174,20 @@ def test_rates_on_three_axes_tell_alpha_where_accelerometers_do_not():
     assert alone.sloped.all()
     still = hypotheses.masked(alone, case.array.index("gz"))
     assert still.bridge.all()
+
+
+COARSE_RIG = parse_rig(preset_text("naap-gyro").replace("pre_trigger", "# pre_trigger"))
+
+
+@pytest.mark.parametrize(
+    ("rate", "fault", "names"),
+    [(200.0, None, ()), (200.0, "gy:gain=30%", ("gy",)), (300.0, "a1y:gain=30%", ("a1y",)), (100.0, None, ())],
+)
+def test_coarse_samples_accuse_nobody_of_what_happens_between_them(rate, fault, names):
+    """At 200 Hz the midpoint rule is off by more than the noise: a rate sensor had been named for a wrong filter."""
+    for seed in range(3) if fault is None else (0,):
+        made = simulate(COARSE_RIG, "general", faults=[fault] if fault else [], seed=seed, rate_hz=rate)
+        found = diagnose(Case(made.recording), {})
+        assert found.channels == names, (seed, found.reason)
+        if rate > 100.0 and fault is None:
+            assert found.status is Status.HEALTHY

@@ -400,9 +400,7 @@ def test_a_unit_in_brackets_that_is_none_of_the_quantity_is_an_error(tmp_path: P
     """It was a note among others, and the readings were taken to be in the rig's unit."""
     path, unit = tmp_path / "t.csv", name[3:-1]
     path.write_text(f"time,{name},q\n" + rows())
-    says = (
-        rf"t.csv: signal p: unknown unit of acceleration; found '{unit}'; .* in the rig's m/s\^2 all the same"
-    )
+    says = rf"t.csv: signal p: unknown unit of acceleration; found '{unit}'; .* in the rig's m/s\^2 all the same"
     with pytest.raises(RecordingError, match=says):
         read(path, RIG)
     named = SMALL.format(recording="").replace('channel="p"', f'channel="p"\nsignal="{name}"')

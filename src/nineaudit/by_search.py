@@ -61,6 +61,10 @@ def by_search(case: Case, evidence: Mapping[str, str]) -> Diagnosis:
     if (best.statistic > UNEXPLAINED * floor and best.word not in WAVEFORMS) or floor > UNEXPLAINED:
         reason = f"something is wrong, but no fault of one or two channels explains it: at best {at}"
         return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
+    if search.healthy.data.between is not None and best.word == "noise":
+        name = case.array.channels[best.channels[0]]
+        reason = f"the samples are too far apart to tell noise of {name} from motion between them; at best {at}"
+        return replace(base, status=Status.UNDIAGNOSED, candidates=candidates, reason=reason)
     group = _group(search, best, floor)
     shown = _shown(case, search, evidence)
     group = [best.channels] if shown == [best] else group + [x.channels for x in shown if x.channels not in group]

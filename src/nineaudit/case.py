@@ -17,11 +17,13 @@ from nineaudit.errors import EstimationError
 from nineaudit.estimate import budget, closed_form, condense
 from nineaudit.estimate import parity as parity_of
 from nineaudit.estimate.at_their_word import at_their_word
+from nineaudit.estimate.deferred import deferred
 from nineaudit.estimate.functional import smoothed
-from nineaudit.estimate.hypotheses import healthy_fit
+from nineaudit.estimate.hypotheses import healthy_fit, log_evidence
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.motion import Motion, bridge, estimate_motion, has_rates, product_free, resampled
 from nineaudit.estimate.search import Search, search
+from nineaudit.estimate.separation import DETECTION_NATS
 from nineaudit.estimate.start import make_data
 from nineaudit.estimate.student import StudentFit, first_fit
 from nineaudit.estimate.suspects import Suspect, suspects
@@ -145,8 +147,18 @@ class Case(Zeroed):
 
     @cached_property
     def search(self) -> Search:
-        """The whole-record fit and its hypotheses. EstimationError where the motion cannot be fitted."""
-        return search(self.healthy, self.onset, self.flagged_blocks, self.statistic_limit)
+        """The whole-record fit and its hypotheses. EstimationError where the motion cannot be fitted.
+
+        Where something stands out, and the record speaks for the truncation of the midpoint rule (deferred.py) as it
+        must for a fault, the samples are coarse: the search is made again with the truncation taken off.
+        """
+        found = search(self.healthy, self.onset, self.flagged_blocks, self.statistic_limit)
+        if not found.found or found.found[0].evidence < DETECTION_NATS:
+            return found
+        fine = deferred(self.healthy)
+        if not fine.converged or log_evidence(fine) - log_evidence(self.healthy) < DETECTION_NATS:
+            return found
+        return search(fine, self.onset, self.flagged_blocks, self.statistic_limit)
 
     @cached_property
     def healthy(self) -> Fit:

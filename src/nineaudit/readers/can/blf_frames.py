@@ -171,7 +171,9 @@ def _group(objects: _Objects, rows: Rows, header: int, record: np.dtype[Any]) ->
     """Some of the objects, all with such a header, with their records behind it."""
     batch, account = objects.batch, objects.account
     every = len(rows) == len(objects.codes)
-    at, code, room = (x if every else x.take(rows) for x in (batch.at, objects.codes, objects.room))
+    at = batch.at if every else batch.at.take(rows)
+    code = objects.codes if every else objects.codes.take(rows)
+    room = objects.room if every else objects.room.take(rows)
 
     def damaged(what: str, fault: NDArray[np.bool_]) -> None:
         _book(account, replace(batch, at=at), what, fault)
