@@ -189,3 +189,12 @@ def test_a_table_of_a_spreadsheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_worker_of_another_version_is_told() -> None:
     with pytest.raises(ConfigurationError, match=r"another nineaudit; found '?0\.0\.0|expected '?0\.0\.0"):
         running.perform({"uri": "T1.csv", "version": "0.0.0"}, NO_LIMITS, "none:none")
+
+
+@pytest.mark.usefixtures("home")
+@pytest.mark.parametrize("lake", ["tests", "."])
+def test_a_lake_is_not_where_the_recordings_are(lake: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, said = called(capsys, "campaign", "run", "tests", "--rig", "rig.toml", "--lake", lake)
+    assert code == 2
+    assert "the recordings are in it" in said
+    assert not (Path(lake) / "lake.json").exists()

@@ -153,8 +153,16 @@ def _lake(plan: Plan) -> Lake:
     """The lake, by a name that is the same from every folder."""
     if plan.lake.startswith("memory://"):
         raise ConfigurationError("only this process would see it", place="--lake", found=plan.lake, expected="a folder")
-    uri = str(local_path(plan.lake).absolute()) if is_local(plan.lake) else plan.lake
+    uri = _whole(plan.lake)
+    if any(f"{_whole(source)}/".startswith(f"{uri}/") for source in plan.sources):
+        advice = "a folder beside the recordings, or one below them"
+        raise ConfigurationError("the recordings are in it", place="--lake", found=plan.lake, advice=advice)
     return lakes.open_lake(uri, create=True)
+
+
+def _whole(uri: str) -> str:
+    """A name that is the same from every folder, without a slash at its end."""
+    return str(local_path(uri).absolute()) if is_local(uri) else uri.rstrip("/")
 
 
 def _of_shard(found: list[Found], shard: str | None) -> list[Found]:

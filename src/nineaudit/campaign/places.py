@@ -108,10 +108,13 @@ def _fetch(uri: str, place: Path) -> None:
 
 
 def _with_company(uri: str) -> list[str]:
-    """A file with those that are read with it: the record of its repair; the channels of a .mme file."""
+    """A file with those that are read with it: the record of its repair; the channels of a .mme file.
+
+    A worker lives long: what it was told of the store before is forgotten."""
     from fsspec.core import url_to_fs
 
     fs, path = url_to_fs(uri)
+    fs.invalidate_cache()
     if name_of(uri).lower().endswith(".mme"):
         return sorted({uri, *(on_path(uri, lambda _, f=f: Path(f)) for f in _beside(fs, path))})  # type: ignore[misc]
     beside = on_path(uri, lambda at: at.with_name(at.name + SIDECAR))
