@@ -33,6 +33,8 @@ from nineaudit.zeroed import Zeroed
 
 CFC_TO_PASS_BAND = 0.6
 """CFC number over its −3 dB frequency: the class is 1000 for 1650 Hz (SAE J211-1)."""
+COARSE = 0.1
+"""Part of a fault's evidence that the truncation of the midpoint rule must reach to be looked into."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +151,15 @@ class Case(Zeroed):
     def search(self) -> Search:
         """The whole-record fit and its hypotheses. EstimationError where the motion cannot be fitted.
 
-        Where something stands out, and the record speaks for the truncation of the midpoint rule (deferred.py) as it
-        must for a fault, the samples are coarse: the search is made again with the truncation taken off.
+        Where the truncation of the midpoint rule (deferred.py) explains as much as a fault must, and no fault ten times
+        as much, the samples are coarse: the search is made again with the truncation taken off.
         """
         found = search(self.healthy, self.onset, self.flagged_blocks, self.statistic_limit)
         if not found.found or found.found[0].evidence < DETECTION_NATS:
             return found
         fine = deferred(self.healthy)
-        if not fine.converged or log_evidence(fine) - log_evidence(self.healthy) < DETECTION_NATS:
+        gained = log_evidence(fine) - log_evidence(self.healthy)
+        if not fine.converged or gained < max(COARSE * found.found[0].evidence, DETECTION_NATS):
             return found
         return search(fine, self.onset, self.flagged_blocks, self.statistic_limit)
 

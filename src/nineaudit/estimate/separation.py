@@ -40,7 +40,8 @@ def coarser(at: Fit, most: int) -> Fit:
     total = squares.sum(axis=1)
     mean = (squares * readings).sum(axis=1) / np.where(total > 0, total, 1.0)
     still = data.still[: whole * length + 1 : length]
-    part = replace(data, time=time.mean(axis=1), readings=mean, weight=np.sqrt(total), still=still, extra=None)
+    part = replace(data, time=time.mean(axis=1), readings=mean, weight=np.sqrt(total), still=still)
+    part = replace(part, extra=None, between=None)
     return replace(at, data=part, omega=at.omega[: whole * length + 1 : length], theta=theta_for(part, at))
 
 
