@@ -26,12 +26,12 @@ import pyarrow.parquet as pq
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from campaign_entries import EDITION, entries, lake_of
-from nineaudit.campaign import schema, tables
-from nineaudit.campaign.compact import compact, stored
-from nineaudit.campaign.index_page import render
-from nineaudit.campaign.index_rows import index
+from nineaudit.campaign.index.index_page import render
+from nineaudit.campaign.index.index_rows import index
 from nineaudit.campaign.lake import Lake, open_lake
-from nineaudit.campaign.query import select
+from nineaudit.campaign.results import schema, tables
+from nineaudit.campaign.results.compact import compact, stored
+from nineaudit.campaign.results.query import select
 
 PART = 500
 QUERIES = {

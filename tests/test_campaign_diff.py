@@ -10,7 +10,8 @@ import pytest
 
 from campaign_entries import Entry, audited, entries, entry, lake_of
 from nineaudit import cli
-from nineaudit.campaign import diff, lake
+from nineaudit.campaign import lake
+from nineaudit.campaign.results import diff
 from nineaudit.files import sealed
 
 OLD, NEW = "00aa11bb22cc", "abc123abc123"

@@ -10,7 +10,7 @@ import typer.main
 
 from campaign_entries import entry, lake_of
 from nineaudit import cli
-from nineaudit.campaign.compact import compact
+from nineaudit.campaign.results.compact import compact
 from nineaudit.commands import simulated, written
 from nineaudit.rig import parse_rig, preset_text
 

@@ -17,13 +17,13 @@ from nineaudit import cli
 from nineaudit.campaign import entries as reading
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign import running, task
-from nineaudit.campaign.compact import compact
 from nineaudit.campaign.guard import NO_LIMITS
 from nineaudit.campaign.health.assess import Health, Member, State
 from nineaudit.campaign.health.page import section
+from nineaudit.campaign.results.compact import compact
+from nineaudit.campaign.results.stale import behind
 from nineaudit.campaign.source_tables import is_table, rows
 from nineaudit.campaign.sources import _unreadable, find
-from nineaudit.campaign.stale import behind
 from nineaudit.errors import ConfigurationError
 
 

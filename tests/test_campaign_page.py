@@ -17,10 +17,12 @@ import pytest
 from lxml import etree
 
 from campaign_entries import Entry, entries, entry, lake_of
-from nineaudit.campaign import index_page, junit, lake, reporting, tables
-from nineaudit.campaign.compact import compact, stored
-from nineaudit.campaign.index_page import Section
-from nineaudit.campaign.index_rows import index
+from nineaudit.campaign import lake
+from nineaudit.campaign.index import index_page, junit, reporting
+from nineaudit.campaign.index.index_page import Section
+from nineaudit.campaign.index.index_rows import index
+from nineaudit.campaign.results import tables
+from nineaudit.campaign.results.compact import compact, stored
 from nineaudit.report.chart import Chart, Line
 from test_browser import AXE, CONTRAST, WCAG, browser  # noqa: F401  (a fixture)
 from test_ci_outputs import HOSTILE, SCHEMA

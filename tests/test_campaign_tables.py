@@ -18,9 +18,9 @@ import pytest
 from campaign_entries import EDITION, audited, entries, entry, lake_of
 from nineaudit import cli
 from nineaudit.campaign import lake as lakes
-from nineaudit.campaign import schema, tables
-from nineaudit.campaign.compact import compact, stored
-from nineaudit.campaign.query import select
+from nineaudit.campaign.results import schema, tables
+from nineaudit.campaign.results.compact import compact, stored
+from nineaudit.campaign.results.query import select
 from nineaudit.errors import ConfigurationError
 from nineaudit.files import sealed
 

@@ -16,8 +16,8 @@ from health_campaigns import Plan, drawn
 from nineaudit import cli
 from nineaudit.campaign.health.assess import assess, assess_records
 from nineaudit.campaign.health.page import section
-from nineaudit.campaign.index_page import render
-from nineaudit.campaign.index_rows import Index
+from nineaudit.campaign.index.index_page import render
+from nineaudit.campaign.index.index_rows import Index
 from nineaudit.estimate.hypotheses import healthy_fit
 from nineaudit.files import sealed
 from nineaudit.report.sensors import _text, unpacked

@@ -1,21 +1,8 @@
-"""The command `campaign`: its subcommands are registered on it by the modules named at the end.
-
-The subcommands return what is to be printed. Heavy modules are imported inside the functions.
-"""
+"""The subcommands of `campaign`, which register themselves on its app; they return what is to be printed."""
 
 from __future__ import annotations
 
-from nineaudit.options import example, group
+from nineaudit.campaign import health_command, run_command, table_commands  # noqa: F401  (register themselves)
+from nineaudit.campaign.app import campaign_app
 
-campaign_app = group(
-    help="Thousands of recordings: audit them on a cluster, keep the results, ask what they say together.",
-    epilog=example("nineaudit campaign run tests --rig rig.toml --lake lake"),
-)
-
-
-@campaign_app.callback()
-def _campaign() -> None:
-    pass
-
-
-from nineaudit.campaign import health_command, run_command, table_commands  # noqa: E402, F401  (registers on it)
+__all__ = ["campaign_app"]

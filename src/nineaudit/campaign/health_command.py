@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nineaudit.campaign.commands import campaign_app
+from nineaudit.campaign.app import campaign_app
 from nineaudit.campaign.entries import Damaged, chosen, current_entries
 from nineaudit.campaign.table_commands import Edition, Ended, LakeOption
 from nineaudit.errors import ConfigurationError, RecordingError
@@ -85,8 +85,8 @@ def rig(
     from nineaudit.calibrating.rig_text import calibrated
     from nineaudit.campaign.health.assess import assess
     from nineaudit.campaign.health.rig_file import evidence, improved
+    from nineaudit.campaign.index.reporting import lake_name
     from nineaudit.campaign.lake import open_lake
-    from nineaudit.campaign.reporting import lake_name
     from nineaudit.outputs import protect, require_absent, write_text
     from nineaudit.report.machine import to_json
     from nineaudit.rig import load_rig

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nineaudit.campaign.commands import campaign_app
+from nineaudit.campaign.app import campaign_app
 from nineaudit.errors import ConfigurationError
 from nineaudit.options import Rules, example
 from nineaudit.progress import Show

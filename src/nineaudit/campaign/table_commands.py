@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nineaudit.campaign.commands import campaign_app
+from nineaudit.campaign.app import campaign_app
 from nineaudit.options import example
 from nineaudit.progress import Show
 from nineaudit.units import counted
 
 if TYPE_CHECKING:
-    from nineaudit.campaign.compact import Compaction
-    from nineaudit.campaign.index_page import Section
+    from nineaudit.campaign.index.index_page import Section
     from nineaudit.campaign.lake import Lake
+    from nineaudit.campaign.results.compact import Compaction
 
 LakeOption = Annotated[str, typer.Argument(metavar="LAKE", help="A folder, s3://bucket/lake, any place of fsspec.")]
 Edition = Annotated[
@@ -43,14 +43,14 @@ def compact(lake: LakeOption, edition: Edition = None) -> Ended:
 
     The same results give the same bytes. Exit code 3 where a result is damaged: it is named and left out.
     """
-    from nineaudit.campaign import compact as compacting
     from nineaudit.campaign.lake import open_lake
+    from nineaudit.campaign.results import compact as compacting
 
     return _compacted(compacting.compact(open_lake(lake), edition))
 
 
 def _compacted(done: Compaction) -> Ended:
-    from nineaudit.campaign import schema
+    from nineaudit.campaign.results import schema
     from nineaudit.report.numbers import printable
 
     wrong = [f"{printable(one.place)}: left out: {printable(one.why)}" for one in done.damaged]
@@ -73,10 +73,10 @@ def query(
     output: Annotated[Path | None, typer.Option(metavar="F", help="Write the answer to this file.")] = None,
 ) -> Telling:
     """Ask the tables of a lake in SQL (DuckDB): recordings, findings, candidates, sensors, provenance."""
-    from nineaudit.campaign import answers
-    from nineaudit.campaign.compact import stored
     from nineaudit.campaign.lake import open_lake
-    from nineaudit.campaign.query import select
+    from nineaudit.campaign.results import answers
+    from nineaudit.campaign.results.compact import stored
+    from nineaudit.campaign.results.query import select
     from nineaudit.outputs import write_text
 
     style = answers.style(format, output)
@@ -109,7 +109,7 @@ def diff(
 
     Exit code 0 where nothing did, 1 where something did, 3 where a result is damaged.
     """
-    from nineaudit.campaign import diff as comparing
+    from nineaudit.campaign.results import diff as comparing
 
     found = comparing.difference(comparing.side(base), comparing.side(head))
     if format == DiffFormat.json:
@@ -126,9 +126,9 @@ def report(
     junit: Annotated[Path | None, typer.Option(metavar="F", help="Write JUnit XML, a testcase a recording.")] = None,
 ) -> Telling:
     """Write the index page of a lake, and JUnit XML, from its tables (see `campaign compact`)."""
-    from nineaudit.campaign import reporting
-    from nineaudit.campaign.compact import stored
+    from nineaudit.campaign.index import reporting
     from nineaudit.campaign.lake import open_lake
+    from nineaudit.campaign.results.compact import stored
     from nineaudit.errors import ConfigurationError
     from nineaudit.outputs import protect
 
@@ -146,7 +146,7 @@ def report(
 
 def _after(lake: Lake, edition: str, lines: list[str]) -> Telling:
     """Show the lines; say where the tables are behind the results."""
-    from nineaudit.campaign.stale import behind
+    from nineaudit.campaign.results.stale import behind
 
     def tell(show: Show, say: Show) -> int:
         late = behind(lake, edition)

@@ -11,7 +11,7 @@ import numpy as np
 from nineaudit.array import FloatArray
 from nineaudit.campaign.health.assess import Health, Member, State
 from nineaudit.campaign.health.words import amount, called, sentence, summary
-from nineaudit.campaign.index_page import Section
+from nineaudit.campaign.index.index_page import Section
 from nineaudit.report.chart import Band, Chart, Level, Line
 from nineaudit.report.numbers import printable
 from nineaudit.units import counted

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nineaudit.campaign import schema
 from nineaudit.campaign.entries import Damaged, chosen, current_entries
-from nineaudit.campaign.tables import OF, Writer, names
+from nineaudit.campaign.results import schema
+from nineaudit.campaign.results.tables import OF, Writer, names
 from nineaudit.errors import ConfigurationError, RecordingError
 from nineaudit.files import settle
 

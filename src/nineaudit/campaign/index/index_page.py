@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 from urllib.parse import quote
 
-from nineaudit.campaign.index_rows import CHANNELS, DOUBLES, WORST, Index, Row, effect
+from nineaudit.campaign.index.index_rows import CHANNELS, DOUBLES, WORST, Index, Row, effect
 from nineaudit.campaign.lake import report_name
 from nineaudit.report.chart import Chart
 from nineaudit.report.numbers import digits, probability, quantity

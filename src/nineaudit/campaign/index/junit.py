@@ -10,7 +10,7 @@ from nineaudit.finding import Severity, Verdict
 from nineaudit.report.numbers import printable
 
 if TYPE_CHECKING:
-    from nineaudit.campaign.compact import Stored
+    from nineaudit.campaign.results.compact import Stored
 
 Row = Mapping[str, Any]
 OUTCOMES: Final = {"fail": "failure", "inconclusive": "error", "not_audited": "error"}

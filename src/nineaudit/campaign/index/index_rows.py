@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from nineaudit.campaign.compact import Stored
+from nineaudit.campaign.results.compact import Stored
 
 Row = Mapping[str, Any]
 VERDICTS: Final = ("fail", "not_audited", "inconclusive", "pass")

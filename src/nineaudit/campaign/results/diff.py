@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from nineaudit.campaign.entries import Damaged, chosen, current_entries
 from nineaudit.campaign.lake import Lake, open_lake
-from nineaudit.campaign.rows import verdicts
+from nineaudit.campaign.results.rows import verdicts
 from nineaudit.report.numbers import printable
 
 SCHEMA: Final = "nineaudit/campaign-diff/1"

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from datetime import date
 from typing import Any, Final
 
-from nineaudit.campaign.schema import ERRORS
+from nineaudit.campaign.results.schema import ERRORS
 
 Row = dict[str, Any]
 FIT: Final = "RB303"

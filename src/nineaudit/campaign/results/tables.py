@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from nineaudit.campaign import schema
-from nineaudit.campaign.rows import rows
+from nineaudit.campaign.results import schema
+from nineaudit.campaign.results.rows import rows
 from nineaudit.errors import RecordingError
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from nineaudit.campaign.compact import Stored
-from nineaudit.campaign.index_page import Section, render
-from nineaudit.campaign.index_rows import WORST, index, reasons
-from nineaudit.campaign.junit import write_junit
+from nineaudit.campaign.index.index_page import Section, render
+from nineaudit.campaign.index.index_rows import WORST, index, reasons
+from nineaudit.campaign.index.junit import write_junit
 from nineaudit.campaign.lake import Lake
+from nineaudit.campaign.results.compact import Stored
 from nineaudit.files import partial_name, settle
 from nineaudit.outputs import make_folder, unwritable, write_text
 
