@@ -218,7 +218,7 @@ def test_a_dead_channel_is_refused(rig: Rig, tmp_path: Path) -> None:
 
 def test_a_staircase_of_one_level_or_upside_down_is_refused(rig: Rig, tmp_path: Path) -> None:
     sensor = rig.array["a0x"]
-    with pytest.raises(EstimationError, match=r"too few levels; found '1 levels in 5 runs, rank 1 of 2'"):
+    with pytest.raises(EstimationError, match=r"too few levels; found '1 level in 5 runs, rank 1 of 2'"):
         fit_path(sensor, np.full(5, 3.0), np.arange(5.0))
     with pytest.raises(EstimationError, match="does not follow the staircase"):
         fit_path(sensor, np.arange(10.0), -np.arange(10.0))

@@ -67,8 +67,8 @@ def lake(one: dict[str, Any], tmp_path: Path) -> Path:
 
 
 def test_health_is_a_table_and_a_document(lake: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, text, _ = called(capsys, "campaign", "health", lake)
-    assert code == 0
+    code, text, said = called(capsys, "campaign", "health", lake)
+    assert (code, said) == (0, "")
     assert "9 sensors in 8 tests: 9 in control" in text
     code, text, _ = called(capsys, "campaign", "health", lake, "--json")
     document = json.loads(text)

@@ -136,7 +136,7 @@ def test_product_free_alpha_has_the_least_noise_of_its_kind() -> None:
         (six(), r"6 accelerometers, \[H Q\] of rank 6, leak 1"),
         (triaxes(0 * X, R * X, R * Y), r"9 accelerometers, \[H Q\] of rank 9"),
         (triaxes(0 * X, R * X), "6 accelerometers, H of rank 5"),
-        (geometry((R * X, Y)), "1 accelerometers, H of rank 1"),
+        (geometry((R * X, Y)), "1 accelerometer, H of rank 1"),
         ((np.zeros((0, 3)), np.zeros((0, 3))), "0 accelerometers, H of rank 0"),
     ],
 )

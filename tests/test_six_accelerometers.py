@@ -106,7 +106,7 @@ def test_readings_that_do_not_fit_are_refused() -> None:
     six = calibrated()
     readings = outputs(six, truth)
     readings[5, 2] = np.nan
-    with pytest.raises(EstimationError, match=r"channels 3 of 6: readings have gaps; found '1 values"):
+    with pytest.raises(EstimationError, match=r"channels 3 of 6: readings have gaps; found '1 value"):
         solve(six, readings, truth.time)
     with pytest.raises(EstimationError, match="do not fit"):
         solve(six, readings[:, :5], truth.time)
@@ -256,7 +256,7 @@ def test_a_gyros_bad_parameters_and_records_are_refused() -> None:
         rate_gyro.second_order(np.zeros(10), time, damping=-1.0)
     with pytest.raises(EstimationError, match="even time base"):
         rate_gyro.second_order(np.zeros(10), time**2)
-    with pytest.raises(EstimationError, match="1 gaps"):
+    with pytest.raises(EstimationError, match="1 gap"):
         rate_gyro.second_order(np.r_[np.nan, np.zeros(9)], time)
     with pytest.raises(EstimationError, match="nothing to compare"):
         rate_gyro.compare(np.zeros((10, 3)), np.zeros((10, 3)), time)

@@ -164,7 +164,7 @@ def _require(outputs: FloatArray, time: FloatArray) -> None:
         raise EstimationError(
             "readings have gaps",
             place=f"channels {', '.join(str(b + 1) for b in bad)} of {CHANNELS}",
-            found=f"{counted(int(np.count_nonzero(~np.isfinite(outputs))), 'value')} that are no number",
+            found=f"{counted(int(np.count_nonzero(~np.isfinite(outputs))), 'value')} without a number",
             advice="six channels have no redundancy to fill them: cut the record before the gap",
         )
     if not (np.isfinite(time).all() and np.all(np.diff(time) > 0.0)):

@@ -3,7 +3,6 @@
 records.py    entries of the lake -> likelihoods in order of time
 connect.py    likelihoods by what connects them
 model.py      the hierarchical model: sensors, seats, tests        scatter.py   how much tests differ
-normal.py     the inverse of its equations
 crowd.py      unknowns of the same recordings, in order of time    shapes.py    how they may change
 look.py       what is seen of further changes
 scan.py       changes with time and shock history                   select.py    which of them there are
