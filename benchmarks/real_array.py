@@ -163,15 +163,17 @@ def examine(recording: Recording, number: int, imus: int, fault: str, culprits: 
     return Result(number, imus, fault, culprits, outcome, said, word, statistic, seconds)
 
 
-def examine_window(recording: Recording, number: int, imus: int, channels: int | None, seed: int) -> list[Result]:
-    """The untouched window, and every fault in each accelerometer or in `channels` of them, drawn."""
+def examine_window(
+    recording: Recording, number: int, imus: int, channels: int | None, seed: int, faults: Sequence[str]
+) -> list[Result]:
+    """The untouched window, and each of the faults in each accelerometer or in `channels` of them, drawn."""
     array = recording.rig.array
     names = [name for name, held in zip(array.channels, array.is_accelerometer, strict=True) if held]
     if channels is not None and channels < len(names):
         rng = np.random.default_rng([seed, number, imus])
         names = sorted(rng.choice(names, channels, replace=False).tolist())
     out = [examine(recording, number, imus, UNTOUCHED, ())]
-    for fault in (*FAULTS, SWAP):
+    for fault in faults:
         out += [examine(found, number, imus, fault, bad) for found, bad in (faulty(recording, fault, c) for c in names)]
     return out
 
@@ -183,6 +185,7 @@ def table(results: Sequence[Result]) -> str:
     for imus in sorted({r.imus for r in results}, reverse=True):
         mine = [r for r in results if r.imus == imus]
         rows = [(fault, [r for r in mine if r.fault == fault]) for fault in (UNTOUCHED, *FAULTS, SWAP)]
+        rows = [(fault, group) for fault, group in rows if group]
         rows.append(("all faults", [r for r in mine if r.fault != UNTOUCHED]))
         for fault, group in rows:
             count = Counter(r.outcome for r in group)
@@ -198,6 +201,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--channels", type=int, help="accelerometers drawn in each window; all without")
     parser.add_argument("--imus", nargs="+", default=["8", "3"], choices=["8", "3"], help="all eight, the subset")
     parser.add_argument("--mask-rails", action="store_true", help="clipped samples of the rate sensors are invalid")
+    parser.add_argument("--only", nargs="+", metavar="FAULT", default=[*FAULTS, SWAP], help="faults to be put in")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path, help="every diagnosis, one JSON object a line")
     return parser.parse_args(arguments)
@@ -216,7 +220,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             part = with_readings(part, np.where(railed(part), np.nan, part.readings))
         for imus in map(int, options.imus):
             chosen = part if imus == 8 else only(part, SUBSET)
-            results += examine_window(chosen, number, imus, options.channels, options.seed)
+            results += examine_window(chosen, number, imus, options.channels, options.seed, options.only)
             print(f"window {number}, {imus} IMUs: {len(results)} diagnoses", file=sys.stderr)
             if options.json:
                 options.json.write_text("".join(json.dumps(r.__dict__) + "\n" for r in results), encoding="utf-8")
