@@ -56,14 +56,19 @@ def run(
     again by Dask, at last alone, then written as not audited. ConfigurationError: no such scheduler; SchedulerLost.
     """
     with _client(scheduler, workers, limits) as client:
-        suspects: list[Suspect] = []
-        yield from _windowed(client, scheduler, iter(requests), limits, function, suspects)
-        for request, _ in suspects:  # one at a time: who dies now dies by its own recording
-            again: list[Suspect] = []
-            yield from _windowed(client, scheduler, iter([request]), limits, function, again)
-            for one, deaths in again:
-                reason = f"every worker that audited it died ({deaths} of them, then as many again)"
-                yield {**give_up(one, reason), "attempts": 2 * deaths}
+        try:
+            suspects: list[Suspect] = []
+            yield from _windowed(client, scheduler, iter(requests), limits, function, suspects)
+            for request, _ in suspects:  # one at a time: who dies now dies by its own recording
+                again: list[Suspect] = []
+                yield from _windowed(client, scheduler, iter([request]), limits, function, again)
+                for one, deaths in again:
+                    reason = f"every worker that audited it died ({deaths} of them, then as many again)"
+                    yield {**give_up(one, reason), "attempts": 2 * deaths}
+        except Exception as error:  # which one it is depends on what was under way when the scheduler went
+            if client.status != "running" and not isinstance(error, NineauditError):
+                raise _lost(scheduler) from error
+            raise
 
 
 def perform(request: Request, limits: Limits, function: str) -> Summary:
