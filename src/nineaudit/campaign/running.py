@@ -11,6 +11,7 @@ import socket
 import time
 import uuid
 from collections.abc import Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
 from itertools import islice
@@ -35,6 +36,8 @@ _AHEAD: Final = 2
 _COUNTED: Final = 2.0
 """Seconds after which the workers are counted again: a cluster may grow."""
 _PATIENCE: Final = "30s"
+_GOING: Final = (OSError, RuntimeError, LookupError, AttributeError, CancelledError)
+"""What Dask raises when a scheduler goes: which depends on what was under way."""
 
 
 class SchedulerLost(NineauditError):
@@ -65,8 +68,14 @@ def run(
                 for one, deaths in again:
                     reason = f"every worker that audited it died ({deaths} of them, then as many again)"
                     yield {**give_up(one, reason), "attempts": 2 * deaths}
-        except Exception as error:  # which one it is depends on what was under way when the scheduler went
-            if client.status != "running" and not isinstance(error, NineauditError):
+        except (
+            OSError,
+            RuntimeError,
+            LookupError,
+            AttributeError,
+            CancelledError,
+        ) as error:  # which one it is depends on what was under way when the scheduler went
+            if client.status != "running":
                 raise _lost(scheduler) from error
             raise
 
