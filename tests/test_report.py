@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -279,8 +280,9 @@ def test_hostile_names_are_only_text(where: str) -> None:
 @pytest.mark.parametrize("where", ["channel", "rig", "path"])
 def test_hostile_names_do_not_break_machine_outputs(where: str) -> None:
     audit = hostile(where)
-    report.to_json(report.result_document(audit))
-    report.junit([audit])
+    document = report.result_document(audit)
+    assert json.loads(report.to_json(document)) == document
+    assert ElementTree.fromstring(report.junit([audit])).tag == "testsuites"
 
 
 def hostile(where: str) -> Any:

@@ -137,8 +137,11 @@ def test_values_that_do_not_fit_are_an_error_and_never_wrapped(tmp_path: Path, v
 def test_ranges_that_are_none_are_not_held_against_a_value(tmp_path: Path) -> None:
     """[0|65535] for a signal of ten bits around zero, as in databases in use, states no range."""
     dbc = database(RIG, tmp_path)
-    dbc.write_text(dbc.read_text().replace("[-624.9507|624.9507]", "[0|65535]"))
+    text = dbc.read_text()
+    dbc.write_text(text.replace("[-624.9507|624.9507]", "[0|65535]"))
+    assert dbc.read_text() != text
     write_recording(MOTION, tmp_path / "r.blf", dbc=dbc)
+    assert (tmp_path / "r.blf").stat().st_size > 0
 
 
 def test_a_stated_range_counts(tmp_path: Path) -> None:

@@ -77,8 +77,8 @@ def masked(data: Data, channel: int, samples: BoolArray | None = None) -> Data:
 
 
 def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) -> Fit:
-    """The fit without one channel, from the start whose first step leads lowest, and from the healthy fit where that
-    ends above what the healthy fit costs without the channel. EstimationError where the others do not tell ω."""
+    """The fit without one channel, from the start whose first step leads lowest. EstimationError where the others do
+    not tell ω."""
     alone = masked(data, channel)
     starts = [healthy.omega]
     if data.array.is_accelerometer[channel]:
@@ -86,12 +86,7 @@ def without(data: Data, healthy: Fit, channel: int, hopeless: float = np.inf) ->
         certain = replace(alone, prior_sd=np.zeros_like(alone.prior_sd))
         first = [fit(certain, start, iterations=1) for start in starts]
         starts = [min(first, key=lambda f: f.cost).omega]
-    found = fit(alone, starts[0], tolerance=ROUGH, hopeless=hopeless)
-    theta = theta_for(alone, healthy)
-    if found.cost <= point(alone, healthy.omega, theta).cost:
-        return found
-    other = fit(alone, healthy.omega, theta, tolerance=ROUGH, hopeless=hopeless)
-    return min(found, other, key=lambda f: f.cost)
+    return fit(alone, starts[0], tolerance=ROUGH, hopeless=hopeless)
 
 
 def _starts_without(alone: Data, healthy: Fit) -> list[FloatArray]:
