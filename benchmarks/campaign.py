@@ -25,6 +25,8 @@ import psutil
 ONE = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 FORMATS = ("csv", "parquet", "mcap", "blf", "asc", "mme")
 CAN = (".blf", ".asc")
+FAULTY = 10
+"""One in so many has a fault and costs more: plain processes take runs of so many in turn, to have as much each."""
 RATIO, GROWTH = 0.90, 16 * 2**20
 """Asked: throughput of Dask by that of plain processes; bytes that the client may grow from its first tenth on."""
 
@@ -54,7 +56,7 @@ def write(folder: Path, count: int, duration: float) -> None:
         if path.exists():
             continue
         path.parent.mkdir(parents=True, exist_ok=True)
-        faults = ["a1y:clipping=0.5"] if i % 10 == 0 else []
+        faults = ["a1y:clipping=0.5"] if i % FAULTY == 0 else []
         made = simulate(rig, "general", faults=faults, seed=i, duration_s=duration).recording
         write_recording(made, path, dbc=[dbc] if path.suffix in CAN else None)
 
@@ -161,7 +163,8 @@ def main() -> int:
     options.add_argument("--empty", type=int, default=2000, help="tasks that do nothing")
     given = options.parse_args()
     if given.share is not None:
-        plain(given.folder, given.lake, [name(i) for i in range(given.share, given.count, given.workers)])
+        mine = [i for i in range(given.count) if i // FAULTY % given.workers == given.share]
+        plain(given.folder, given.lake, [name(i) for i in mine])
         return 0
     overhead(given.empty, given.workers)
     with tempfile.TemporaryDirectory() as fresh:
