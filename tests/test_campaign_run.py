@@ -9,12 +9,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from campaigns import campaign, contents, entries, noted, plan, told
+from nineaudit.campaign import running
 from nineaudit.campaign.guard import Limits
 from nineaudit.campaign.running import SchedulerLost
 from nineaudit.errors import ConfigurationError
@@ -214,8 +217,27 @@ def test_a_plan_that_is_wrong_is_a_sentence(change: dict[str, str], said: str) -
     assert str(error.value).removeprefix(f"{Path.cwd()}/").startswith(said)
 
 
-def test_a_lost_scheduler_is_not_a_pass() -> None:
+@pytest.mark.parametrize(("answers", "raised"), [(False, SchedulerLost), (True, OSError)])
+def test_a_stream_that_closes_is_a_lost_scheduler_where_it_does_not_answer(
+    monkeypatch: pytest.MonkeyPatch, answers: bool, raised: type[Exception]
+) -> None:
+    """Fetching a result meets the end of a scheduler before the client knows that it went: it still says "running"."""
+
+    def asked(_function: object, **_options: object) -> None:
+        if not answers:
+            raise OSError("connection refused")
+
+    client = SimpleNamespace(status="running", sync=asked, scheduler=SimpleNamespace(identity=None))
+    monkeypatch.setattr(running, "_client", lambda *_: nullcontext(client))
+    monkeypatch.setattr(running, "_windowed", lambda *_: _closes())
+    with pytest.raises(raised):
+        list(running.run([]))
     assert SchedulerLost.exit_code == 3
+
+
+def _closes() -> Iterator[None]:
+    raise OSError("stream is closed")
+    yield
 
 
 def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

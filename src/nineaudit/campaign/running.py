@@ -31,11 +31,13 @@ LOCAL: Final = "local"
 Suspect = tuple[Request, int]
 """A request whose workers died, and how many of them."""
 _AHEAD: Final = 2
-
 """Tasks in flight for each thread of the workers: the next one is there when one ends."""
 _COUNTED: Final = 2.0
 """Seconds after which the workers are counted again: a cluster may grow."""
-_PATIENCE: Final = "30s"
+_ASKED: Final = 0.5
+"""Seconds after which a scheduler is asked again whether it is there."""
+_PATIENCE: Final = 30.0
+"""Seconds in which a scheduler has to answer."""
 _GOING: Final = (OSError, RuntimeError, LookupError, AttributeError, CancelledError)
 """What Dask raises when a scheduler goes: which depends on what was under way."""
 
@@ -68,14 +70,8 @@ def run(
                 for one, deaths in again:
                     reason = f"every worker that audited it died ({deaths} of them, then as many again)"
                     yield {**give_up(one, reason), "attempts": 2 * deaths}
-        except (
-            OSError,
-            RuntimeError,
-            LookupError,
-            AttributeError,
-            CancelledError,
-        ) as error:  # which one it is depends on what was under way when the scheduler went
-            if client.status != "running":
+        except _GOING as error:
+            if _gone(client):
                 raise _lost(scheduler) from error
             raise
 
@@ -136,6 +132,20 @@ def _windowed(
         if time.monotonic() - counted > _COUNTED:
             count, counted = _window(client), time.monotonic()
         done.update(_submit(client, requests, count - len(pending), limits, function, pending))
+
+
+def _gone(client: Client) -> bool:
+    """Whether the scheduler went away: it is asked, for what the client says of itself lags behind what it meets."""
+    end = time.monotonic() + _PATIENCE
+    while client.status == "running" and time.monotonic() < end:
+        try:
+            client.sync(client.scheduler.identity, callback_timeout=_ASKED)  # type: ignore[union-attr]
+        except TimeoutError:
+            continue
+        except _GOING:
+            return True
+        return client.status != "running"
+    return True
 
 
 def _submit(
