@@ -104,6 +104,14 @@ def test_an_unreadable_recording_is_kept_like_any(folder: Path) -> None:
     assert "transient" not in entries(folder / "lake")["gone.csv"]
 
 
+@pytest.mark.parametrize("uri", ["tests/gone.csv", "memory://gone.csv"])
+def test_a_recording_that_is_nowhere_is_told_by_its_verdict_with_a_lake_and_without(uri: str) -> None:
+    entry = task.audit_one(uri, "rig.toml")
+    assert (entry["uri"], entry["result"]["verdict"]) == (uri, "not_audited")
+    assert "no such file" in entry["result"]["reason"].lower()
+    assert task.audit_one(uri, "rig.toml", lake="lake")["reason"] == entry["result"]["reason"]
+
+
 def test_a_configuration_that_is_wrong_for_one_recording_costs_only_that() -> None:
     Path("tests/bus.blf").write_bytes(b"LOGG" + bytes(200))
     assert task.audit_one("tests/bus.blf", "rig.toml", lake="lake")["verdict"] == "not_audited"

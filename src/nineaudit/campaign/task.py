@@ -6,20 +6,17 @@ waivers and the databases, so that the same key is the same answer.
 
 from __future__ import annotations
 
-import datetime as dt
-import hashlib
-import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from nineaudit.campaign import lake as lakes
-from nineaudit.campaign.places import SIDECAR, fetched, is_local, name_of, recording_files, signature, split
+from nineaudit.campaign.making import audited, failed, gate_of, hashes_of, key_of
+from nineaudit.campaign.places import fetched, recording_files, signature
 from nineaudit.campaign.settings import Document, Setting, collect, identity, load, rig_bytes
-from nineaudit.errors import ConfigurationError, RecordingError
+from nineaudit.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from nineaudit.campaign.lake import Lake
@@ -56,7 +53,7 @@ def audit_one(
     document = collect(rig, dbc=dbc, rules=rules, select=select, ignore=ignore, waivers=waivers)
     setting = load(document)
     if lake is None:
-        return _audited(uri, setting, dict(test or {}))[0]
+        return _entry_of(uri, setting, test or {})
     opened = lakes.open_lake(lake, create=True)
     prepare(opened, document)
     return audit_into(opened, uri, setting, dict(test or {}), resume, reports)
@@ -74,16 +71,29 @@ def audit_into(
             if known is not None:
                 return known
             path = stack.enter_context(fetched(uri, setting.rig.parts))
-        except FileNotFoundError:
-            return write_failure(lake, uri, setting, test, "no such file", transient=False)
         except OSError as error:
-            return write_failure(lake, uri, setting, test, f"cannot be fetched: {error}", transient=True)
-        hashes = _hashes(path, setting)
+            transient = not isinstance(error, FileNotFoundError)
+            return write_failure(lake, uri, setting, test, _why(error), transient=transient)
+        hashes = hashes_of(path, setting)
         kept = _kept(lake, uri, key_of(hashes, setting, test), setting.edition, reports)
         summary = kept or _written(lake, uri, path, hashes, setting, test, reports)
     if seen is not None and hashes:
         lakes.write(lake, _stat_name(uri), {"uri": uri, "signature": seen, "sha256": hashes})
     return summary
+
+
+def _entry_of(uri: str, setting: Setting, test: Mapping[str, str]) -> dict[str, Any]:
+    with ExitStack() as stack:
+        try:
+            path = stack.enter_context(fetched(uri, setting.rig.parts))
+        except OSError as error:
+            return failed(uri, setting, test, _why(error))
+        return audited(uri, path, hashes_of(path, setting), setting, test)[0]
+
+
+def _why(error: OSError) -> str:
+    """Why a recording could not be fetched."""
+    return "no such file" if isinstance(error, FileNotFoundError) else f"cannot be fetched: {error}"
 
 
 def prepare(lake: Lake, document: Document) -> str:
@@ -102,20 +112,9 @@ def write_failure(
 ) -> Summary:
     """Write the entry of a recording that could not be audited, with its reason. `transient`: the next run tries it
     again."""
-    from nineaudit.auditing import versions
-    from nineaudit.report import failure_document
-
-    document = failure_document(PurePath(uri), RecordingError(reason, file=uri), versions())  # type: ignore[arg-type]
-    result = _as_named(document, uri, "", setting)
-    entry = _entry(uri, key_of([], setting, test), setting, test, result)
-    entry = {**entry, "reason": result["reason"], "transient": True} if transient else entry
+    entry = failed(uri, setting, test, reason)
+    entry = {**entry, "reason": entry["result"]["reason"], "transient": True} if transient else entry
     return _put(lake, entry, None)
-
-
-def key_of(hashes: Sequence[str], setting: Setting, test: Mapping[str, str]) -> str:
-    """The key of an entry: of the recording's files (none where they could not be read), of what it is judged by."""
-    content = [list(hashes), *setting.parts_of_key(dt.date.today()), dict(sorted(test.items()))]
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
 def require_reports(reports: str) -> None:
@@ -142,7 +141,7 @@ def _kept(lake: Lake, uri: str, key: str, edition: str, reports: str) -> Summary
         entry = lakes.read_entry(lake, uri, key)
         if entry is None or entry.get("transient"):
             return None
-        pointer = {"key": key, **_pointer(entry, _gate_of_document(entry["result"]))}
+        pointer = {"key": key, **_pointer(entry, gate_of(entry["result"]))}
         lakes.point(lake, edition, uri, **pointer)
     elif pointer.get("transient") or not lakes.exists(lake, lakes.entry_name(uri, key)):
         return None
@@ -167,8 +166,8 @@ def _pointer(entry: Mapping[str, Any], gate: str | None) -> dict[str, Any]:
 def _written(
     lake: Lake, uri: str, path: Path, hashes: list[str], setting: Setting, test: dict[str, str], reports: str
 ) -> Summary:
-    entry, outcome = _audited(uri, setting, test, path, hashes)
-    gate = _gate_of_document(entry["result"])
+    entry, outcome = audited(uri, path, hashes, setting, test)
+    gate = gate_of(entry["result"])
     if outcome.audit is not None and _asked(reports, gate):
         _write_report(lake, outcome, entry)
     return _put(lake, entry, gate)
@@ -193,92 +192,11 @@ def _summary(uri: str, edition: str, pointer: Mapping[str, Any], *, kept: bool) 
     }
 
 
-def _audited(
-    uri: str, setting: Setting, test: dict[str, str], path: Path | None = None, hashes: list[str] | None = None
-) -> tuple[dict[str, Any], Outcome]:
-    """The entry of a recording, and the outcome that it is made of. OSError where it cannot be fetched."""
-    if path is None:
-        with fetched(uri, setting.rig.parts) as found:
-            return _audited(uri, setting, test, found, _hashes(found, setting))
-    outcome = _outcome(uri, path, setting)
-    result = _as_named(outcome.document(), uri, str(path.parent) if not is_local(uri) else "", setting)
-    return _entry(uri, key_of(hashes or [], setting, test), setting, test, result), outcome
-
-
-def _outcome(uri: str, path: Path, setting: Setting) -> Outcome:
-    """As `check` has it; but what is wrong with one rig or its databases concerns its recordings alone."""
-    from nineaudit.checking import Outcome, audit_each
-
-    waivers = setting.waivers
-    if waivers is not None:
-        waivers = tuple(_named(w, uri, path) for w in waivers if w.fits(PurePath(uri)))  # type: ignore[arg-type]
-    try:
-        return next(audit_each([path], setting.rig, setting.rulebook, waivers, setting.dbc))
-    except ConfigurationError as error:
-        return Outcome(path, error=error)
-
-
-def _named(waiver: Any, uri: str, path: Path) -> Any:
-    """A waiver that fits the uri, so that it fits the copy too."""
-    return waiver if is_local(uri) else replace(waiver, recordings=path.name)
-
-
-def _entry(uri: str, key: str, setting: Setting, test: dict[str, str], result: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "schema": lakes.ENTRY,
-        "key": key,
-        "uri": uri,
-        "edition": setting.edition,
-        "test": dict(sorted(test.items())),
-        "result": result,
-    }
-
-
-def _hashes(path: Path, setting: Setting) -> list[str]:
-    """SHA-256 of the recording's files and of the record of its repair; none where one cannot be read."""
-    from nineaudit.readers import fingerprint
-
-    found = []
-    for file in setting.rig.files(path):
-        beside = file.with_name(file.name + SIDECAR)
-        try:
-            found += [fingerprint(one)[1] for one in (file, *([beside] if beside.is_file() else []))]
-        except (RecordingError, FileNotFoundError, IsADirectoryError, PermissionError):
-            return []
-    return found
-
-
-def _as_named(document: Mapping[str, Any], uri: str, copy: str, setting: Setting) -> dict[str, Any]:
-    """The result with the uri for the path at which it was read, and sealed again; no folder of this machine."""
-    from nineaudit.files import sealed
-
-    text = json.dumps({key: value for key, value in document.items() if key != "seal"}, ensure_ascii=False)
-    for folder, name in ((copy, uri.removesuffix(split(uri)[2]).removesuffix(name_of(uri))), (str(setting.folder), "")):
-        text = text.replace(_inside(folder) + "/", _inside(name)) if folder else text
-    result: dict[str, Any] = json.loads(text)
-    result["recording"]["path"] = uri
-    return sealed(result)
-
-
-def _inside(text: str) -> str:
-    """A text as it stands within a JSON string."""
-    return json.dumps(text, ensure_ascii=False)[1:-1]
-
-
 def _write_report(lake: Lake, outcome: Outcome, entry: Mapping[str, Any]) -> None:
     from nineaudit.report import render
 
     assert outcome.audit is not None
     lakes.write_text(lake, lakes.report_name(entry["uri"], entry["key"]), render(outcome.audit))
-
-
-def _gate_of_document(result: Mapping[str, Any]) -> str | None:
-    """The weakest --fail-on that a result fails: error, warning, or None; None too where it is not audited."""
-    from nineaudit.engine import gate
-    from nineaudit.finding import Finding, Severity, Verdict
-
-    found = [Finding(f["rule"], Verdict(f["verdict"]), Severity(f["severity"]), "") for f in result["findings"]]
-    return next((level for level in ("error", "warning") if not gate(found, level)), None)
 
 
 def _stat_name(uri: str) -> str:
