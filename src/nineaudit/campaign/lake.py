@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from nineaudit.campaign.places import store_errors
 from nineaudit.errors import ConfigurationError
 from nineaudit.files import settle
 
@@ -60,7 +61,7 @@ def open_lake(uri: str | os.PathLike[str], create: bool = False) -> Lake:
     named = os.fspath(uri)
     try:
         fs, root = url_to_fs(named)
-    except (ImportError, ValueError) as error:
+    except store_errors() as error:
         raise ConfigurationError(f"cannot be opened: {error}", file=named) from error
     lake = Lake(fs, root.rstrip("/"), named)
     _require_lake(lake, create)
@@ -228,7 +229,7 @@ def _require_lake(lake: Lake, create: bool) -> None:
         if found is None and create:
             write(lake, "lake.json", {"schema": LAKE})
             return
-    except OSError as error:
+    except store_errors() as error:
         raise ConfigurationError(f"cannot be opened: {error}", file=lake.uri) from error
     if found is None:
         raise ConfigurationError("is no lake", file=lake.uri, advice="`nineaudit campaign run` makes one")

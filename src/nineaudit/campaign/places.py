@@ -5,16 +5,31 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, Final
 
 from nineaudit.errors import ConfigurationError
 from nineaudit.parts import Part, files, part_of
 
-SIDECAR = ".provenance.json"
+SIDECAR: Final = ".provenance.json"
+_OF_CLIENTS: Final = {
+    "botocore.exceptions": ("BotoCoreError", "ClientError"),
+    "aiohttp": ("ClientError",),
+    "ftplib": ("Error",),
+}
+"""What clients of stores raise that is no OSError."""
+
+
+def store_errors() -> tuple[type[Exception], ...]:
+    """What says that a place cannot be opened, reached or read, as of now: clients are loaded when they are needed."""
+    loaded = [(sys.modules[module], names) for module, names in _OF_CLIENTS.items() if module in sys.modules]
+    others = [getattr(module, name) for module, names in loaded for name in names]
+    return (OSError, ImportError, ValueError, zipfile.BadZipFile, *others)
 
 
 def split(uri: str) -> tuple[str, str, str]:
@@ -66,15 +81,27 @@ def read_bytes(uri: str, what: str) -> bytes:
     try:
         fs, path = url_to_fs(uri)
         return bytes(fs.cat_file(path))
-    except (OSError, ImportError, ValueError) as error:
+    except store_errors() as error:
         said = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise ConfigurationError(f"{what}: {said}", file=uri) from error
+
+
+@contextmanager
+def asked() -> Iterator[None]:
+    """A store is asked in it: OSError, whatever its client raises."""
+    try:
+        yield
+    except OSError:
+        raise
+    except store_errors() as error:
+        raise OSError(str(error)) from error
 
 
 def signature(uris: Sequence[str]) -> str | None:
     """What tells without reading whether files are as they were: sizes with times, entity tags or checksums; None
     where one is not there. OSError where a store cannot be asked."""
-    said = [_signature(file) for uri in uris for file in _with_company(uri)]
+    with asked():
+        said = [_signature(file) for uri in uris for file in _with_company(uri)]
     if any(one is None for one in said):
         return None
     return hashlib.sha256("\0".join(str(one) for one in said).encode()).hexdigest()
@@ -91,9 +118,10 @@ def fetched(uri: str, parts: Sequence[Part]) -> Iterator[Path]:
     try:
         own = part_of(Path(split(uri)[1]), parts)
         depth = own.depth if own else 1
-        for file in recording_files(uri, parts):
-            for one in _with_company(file):
-                _fetch(one, folder / _below(one, uri, depth))
+        with asked():
+            for file in recording_files(uri, parts):
+                for one in _with_company(file):
+                    _fetch(one, folder / _below(one, uri, depth))
         yield folder / _below(uri, uri, depth)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -102,8 +130,8 @@ def fetched(uri: str, parts: Sequence[Part]) -> Iterator[Path]:
 def _fetch(uri: str, place: Path) -> None:
     from fsspec.core import url_to_fs
 
-    fs, path = url_to_fs(uri)
     place.parent.mkdir(parents=True, exist_ok=True)
+    fs, path = url_to_fs(uri)
     fs.get_file(path, str(place))
 
 
