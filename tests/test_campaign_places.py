@@ -6,12 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fsspec.core import url_to_fs
 
 from campaigns import campaign
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign import task
 from nineaudit.campaign.settings import collect
+from nineaudit.campaign.waiving import unmatched
 from nineaudit.errors import ConfigurationError
+from nineaudit.waivers import load_waivers
 
 UNREACHABLE = ["s3://bucket/T1.csv", "s3://A_bad/bucket!/T1.csv", "nonsense://T1.csv", "zip://T1.csv::broken.zip"]
 
@@ -60,3 +63,50 @@ def test_a_mistake_of_ours_is_none_of_the_store(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(task, "recording_files", wrong)
     with pytest.raises(ValueError, match="ours"):
         task.audit_one("tests/T1.csv", "rig.toml", lake="lake")
+
+
+def waived(pattern: str) -> None:
+    """A waiver in w.toml of what is not evaluated in T1.csv."""
+    Path("w.toml").write_text(
+        f"[[waiver]]\nrule = 'ZO102'\nrecordings = '{pattern}'\nreason = 'r'\napproved_by = 'a'\n"
+        "approved_on = 2026-01-01\nexpires = 2099-01-01\n",
+        encoding="utf-8",
+    )
+
+
+@pytest.mark.parametrize(
+    ("uri", "pattern"),
+    [
+        ("memory://2025/T[1].csv", "memory://2025/*"),
+        ("memory://2025/T[1].csv", "T[[]1].csv"),
+        ("memory://2025/T1.csv", "T?.csv"),
+        ("file://{home}/tests/T1.csv", "{home}/tests/*.csv"),
+        ("file://{home}/tests/T1.csv", "file://{home}/*"),
+        ("tests/T1.csv", "tests/*"),
+    ],
+)
+def test_a_waiver_is_for_a_recording_by_its_name_wherever_it_is(home: Path, uri: str, pattern: str) -> None:
+    uri, pattern = (text.format(home=home.as_posix()) for text in (uri, pattern))
+    if uri.startswith("memory://"):
+        url_to_fs(uri)[0].pipe_file(url_to_fs(uri)[1], Path("tests/T1.csv").read_bytes())
+    waived(pattern)
+    result = task.audit_one(uri, "rig.toml", waivers="w.toml")["result"]
+    verdicts = {f["rule"]: f["verdict"] for f in result["findings"]}
+    assert (verdicts["ZO102"], verdicts["WV001"], result["verdict"]) == ("waived", "pass", "pass")
+
+
+def test_a_waiver_is_told_as_it_was_written() -> None:
+    fs, path = url_to_fs("memory://2026/T1.csv")
+    fs.pipe_file(path, Path("tests/T1.csv").read_bytes())
+    waived("memory://2026/*")
+    Path("w.toml").write_text(Path("w.toml").read_text(encoding="utf-8").replace("ZO102", "RQ106"), encoding="utf-8")
+    findings = task.audit_one("memory://2026/T1.csv", "rig.toml", waivers="w.toml")["result"]["findings"]
+    (said,) = (f["reason"] for f in findings if f["rule"] == "WV001")
+    assert said == "waiver of RQ106 for memory://2026/* by a has no finding to waive"
+
+
+def test_waivers_that_match_no_recording_of_a_store() -> None:
+    waived("s3://b/2025/*")
+    waivers = load_waivers("w.toml")
+    assert unmatched(waivers, ["s3://b/2025/T1.mf4"]) == ()
+    assert unmatched(waivers, ["s3://b/2026/T1.mf4", "b/2025/T1.mf4"]) == waivers

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from nineaudit import progress
@@ -21,6 +21,7 @@ from nineaudit.campaign.lake import Lake
 from nineaudit.campaign.places import is_local, local_path
 from nineaudit.campaign.settings import collect, load
 from nineaudit.campaign.sources import Found, find
+from nineaudit.campaign.waiving import unmatched
 from nineaudit.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class Judged:
     plan: Plan
     lake: Lake
     known: dict[tuple[str | None, tuple[str, ...]], tuple[str, Sequence[Part]]] = field(default_factory=dict)
+    waivers: Sequence[Waiver] = ()
+    """Those of the plan, which are in each setting."""
 
     def of(self, rig: str | None, dbc: tuple[str, ...] = (), place: str = "") -> tuple[str, Sequence[Part]]:
         """(identity of the setting, parts of its rig). ConfigurationError: no rig, or one that is wrong."""
@@ -84,7 +87,9 @@ class Judged:
                 ignore=plan.ignore,
                 waivers=plan.waivers,
             )
-            self.known[named, dbc] = task.prepare(self.lake, document), load(document).rig.parts
+            setting = load(document)
+            self.known[named, dbc] = task.prepare(self.lake, document), setting.rig.parts
+            self.waivers = setting.waivers or ()
         return self.known[named, dbc]
 
     def parts(self, found: Found) -> Sequence[Part]:
@@ -98,7 +103,7 @@ def _run(plan: Plan, show: progress.Show, say: progress.Show) -> int:
     judged = Judged(plan, lake)
     everything = list(find(plan.sources, judged.parts, without=lake.root, exclude=plan.exclude))
     found = _of_shard(everything, plan.shard)
-    lost = _unmatched(plan, everything)
+    lost = unmatched(judged.waivers, [one.uri for one in everything])
     done = running.run(_requests(plan, judged, found), plan.scheduler, plan.workers, plan.limits, plan.function)
     code = _watched(plan, lake, done, len(found), show, say)
     for waiver in lost:
@@ -173,16 +178,6 @@ def _of_shard(found: list[Found], shard: str | None) -> list[Found]:
     if not (i.isdigit() and n.isdigit() and 1 <= int(i) <= int(n)):
         raise ConfigurationError("no such part", place="--shard", found=shard, expected="I/N, as 1/8 to 8/8")
     return [one for one in found if int(lakes.hashed(one.uri)[3:], 16) % int(n) == int(i) - 1]
-
-
-def _unmatched(plan: Plan, found: Iterable[Found]) -> tuple[Waiver, ...]:
-    from nineaudit.checking import load_book
-    from nineaudit.waivers import load_waivers, unmatched
-
-    if plan.waivers is None:
-        return ()
-    waivers = load_waivers(Path(plan.waivers), load_book(Path(plan.rules) if plan.rules else None).codes)
-    return unmatched(waivers, (PurePath(one.uri) for one in found))  # type: ignore[misc]
 
 
 def _noted(lake: Lake, done: Iterable[Summary]) -> Iterator[Summary]:

@@ -6,13 +6,13 @@ import datetime as dt
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign.places import SIDECAR, is_local, name_of, split
 from nineaudit.campaign.settings import Setting
+from nineaudit.campaign.waiving import for_this
 from nineaudit.errors import ConfigurationError, RecordingError
 
 if TYPE_CHECKING:
@@ -72,18 +72,11 @@ def _outcome(uri: str, path: Path, setting: Setting) -> Outcome:
     """As `check` has it; but what is wrong with one rig or its databases concerns its recordings alone."""
     from nineaudit.checking import Outcome, audit_each
 
-    waivers = setting.waivers
-    if waivers is not None:
-        waivers = tuple(_named(w, uri, path) for w in waivers if w.fits(PurePath(uri)))  # type: ignore[arg-type]
+    waivers = None if setting.waivers is None else for_this(setting.waivers, uri)
     try:
         return next(audit_each([path], setting.rig, setting.rulebook, waivers, setting.dbc))
     except ConfigurationError as error:
         return Outcome(path, error=error)
-
-
-def _named(waiver: Any, uri: str, path: Path) -> Any:
-    """A waiver that fits the uri, so that it fits the copy too."""
-    return waiver if is_local(uri) else replace(waiver, recordings=path.name)
 
 
 def _as_named(document: Mapping[str, Any], uri: str, copy: str, setting: Setting) -> dict[str, Any]:
