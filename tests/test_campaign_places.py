@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 from fsspec.core import url_to_fs
+from fsspec.implementations.memory import MemoryFileSystem
 
 from campaigns import campaign
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign import task
+from nineaudit.campaign.places import signature
 from nineaudit.campaign.settings import collect
 from nineaudit.campaign.waiving import unmatched
 from nineaudit.errors import ConfigurationError
@@ -110,3 +112,53 @@ def test_waivers_that_match_no_recording_of_a_store() -> None:
     waivers = load_waivers("w.toml")
     assert unmatched(waivers, ["s3://b/2025/T1.mf4"]) == ()
     assert unmatched(waivers, ["s3://b/2026/T1.mf4", "b/2025/T1.mf4"]) == waivers
+
+
+@pytest.fixture
+def mme() -> str:
+    """An ISO-MME test of two channels; the second and the folder Channel of another are symbolic links."""
+    for name in ("store", "test", "linked"):
+        Path(name).mkdir()
+    for name in ("test/t.mme", "test/t.001", "store/t.002", "linked/t.mme"):
+        Path(name).write_text(name, encoding="utf-8")
+    Path("test/t.002").symlink_to(Path("store/t.002").absolute())
+    Path("linked/Channel").symlink_to(Path("store").absolute())
+    return "test/t.mme"
+
+
+def changed(path: str) -> None:
+    Path(path).write_text("of another size", encoding="utf-8")
+
+
+@pytest.mark.usefixtures("mme")
+@pytest.mark.parametrize("uri", ["test/t.mme", "linked/t.mme"])
+def test_a_channel_that_is_a_link_tells_that_it_changed(uri: str) -> None:
+    before = signature([uri])
+    assert before == signature([uri]) is not None
+    changed("store/t.002")
+    assert signature([uri]) != before
+
+
+def test_a_channel_of_another_name_is_another_recording(mme: str) -> None:
+    before = signature([mme])
+    Path("test/t.001").rename("test/t.003")
+    assert signature([mme]) != before
+
+
+@pytest.mark.parametrize(
+    "key", ["ETag", "Last-Modified", "Content-MD5", "LastModified", "last_modified", "modify", "mtime", None]
+)
+def test_what_a_store_says_of_a_file_tells_that_it_changed(key: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    fs, path = url_to_fs("memory://said/T1.csv")
+    fs.pipe_file(path, b"1")
+    whole, said = fs.info(path), []
+    for value in ("a", "b", "a"):
+        told = {"name": path, "size": 1, "type": "file", **({key: value} if key else {})}
+        monkeypatch.setattr(MemoryFileSystem, "info", lambda *_, told=told, **__: told)
+        said.append(signature(["memory://said/T1.csv"]))
+    assert set(whole) == {"name", "size", "type", "created"}
+    if key is None:
+        assert said == [None, None, None], "it is read"
+    else:
+        assert said[0] == said[2] != said[1]
+        assert None not in said

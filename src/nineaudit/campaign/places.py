@@ -23,6 +23,11 @@ _OF_CLIENTS: Final = {
     "ftplib": ("Error",),
 }
 """What clients of stores raise that is no OSError."""
+_TELLING: Final = (
+    *("ETag", "etag", "CRC", "md5Hash", "Content-MD5", "Digest"),
+    *("Last-Modified", "LastModified", "last_modified", "mtime", "modify", "modificationTime", "created"),
+)
+"""What stores call an entity tag, a checksum or a time of change; the first that is there counts."""
 
 
 def store_errors() -> tuple[type[Exception], ...]:
@@ -151,31 +156,36 @@ def _with_company(uri: str) -> list[str]:
 
 def _beside(fs: Any, path: str) -> Iterator[str]:
     """The files in the folder of a .mme file and in its folder Channel."""
-    folder = fs._parent(path)
-    for entry in fs.ls(folder, detail=True):
-        name = str(entry["name"]).rstrip("/")
-        if entry["type"] == "directory" and name.rpartition("/")[2].lower() == "channel":
-            yield from (str(one["name"]) for one in fs.ls(name, detail=True) if one["type"] == "file")
-        elif entry["type"] == "file":
+    for name, kind in _listed(fs, fs._parent(path)):
+        if kind == "directory" and name.rpartition("/")[2].lower() == "channel":
+            yield from (one for one, what in _listed(fs, name) if what == "file")
+        elif kind == "file":
             yield name
 
 
+def _listed(fs: Any, folder: str) -> Iterator[tuple[str, str]]:
+    """(name, "file" or "directory") of what is in a folder; of a symbolic link, what it leads to."""
+    for entry in fs.ls(folder, detail=True):
+        name, kind = str(entry["name"]).rstrip("/"), str(entry["type"])
+        if kind not in ("file", "directory"):
+            kind = "directory" if fs.isdir(name) else "file" if fs.isfile(name) else kind
+        yield name, kind
+
+
 def _signature(uri: str) -> str | None:
+    """Of a file that may be renamed: the name is in it."""
     from fsspec.core import url_to_fs
 
     fs, path = url_to_fs(uri)
-    if is_local(uri):
-        try:
-            stat = Path(path).stat()
-        except FileNotFoundError:
-            return None
-        return f"{stat.st_size} {stat.st_mtime_ns}"
     try:
+        if is_local(uri):
+            stat = Path(path).stat()
+            return f"{name_of(uri)} {stat.st_size} {stat.st_mtime_ns}"
         info = fs.info(path)
     except FileNotFoundError:
         return None
-    tag = next((info[key] for key in ("ETag", "etag", "CRC", "md5Hash", "mtime", "created") if info.get(key)), None)
-    return f"{info.get('size')} {tag}"
+    tag = next((info[key] for key in _TELLING if info.get(key)), None)
+    return None if tag is None else f"{name_of(uri)} {info.get('size')} {tag}"
 
 
 def _below(uri: str, first: str, depth: int) -> Path:
