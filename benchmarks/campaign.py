@@ -127,7 +127,8 @@ def overhead(count: int, workers: int) -> None:
     """What a task costs besides its audit, with the process of the worker that answers at once."""
     from nineaudit.campaign.running import run
 
-    os.environ["PYTHONPATH"] = str(Path(__file__).parent)
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), *([before] if before else [])])
     began, first = time.perf_counter(), 0.0
     for _ in run(({"uri": str(i)} for i in range(count)), workers=workers, function="campaign:nothing"):
         first = first or time.perf_counter()
