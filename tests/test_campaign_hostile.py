@@ -23,7 +23,7 @@ from nineaudit.campaign.health.page import section
 from nineaudit.campaign.results.compact import compact
 from nineaudit.campaign.results.stale import behind
 from nineaudit.campaign.source_tables import is_table, rows
-from nineaudit.campaign.sources import _unreadable, find
+from nineaudit.campaign.sources import find
 from nineaudit.errors import ConfigurationError
 
 
@@ -163,11 +163,6 @@ def test_what_lies_beside_recordings_is_none() -> None:
     assert found("tests") == ["T1.csv", "broken.csv", "daq.log", "daq.log"]
     assert found("tests", "*.log", "broken*") == found("tests/*", "*.log", "tests/broken.csv") == ["T1.csv"]
     assert found("tests/README.txt") == ["README.txt"], "what is named is audited"
-
-
-def test_a_folder_that_cannot_be_listed_is_told() -> None:
-    with pytest.raises(ConfigurationError, match="x: cannot be listed: Permission denied"):
-        _unreadable(PermissionError(13, "Permission denied", "x"))
 
 
 def test_a_table_of_a_spreadsheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,11 +6,12 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from datetime import date, datetime
 from pathlib import PurePosixPath
 from typing import Any, Final
 
-from nineaudit.campaign.places import name_of, read_bytes
+from nineaudit.campaign.places import name_of, read_bytes, store_errors
 from nineaudit.errors import ConfigurationError
 
 TABLES: Final = (".csv", ".tsv", ".parquet", ".jsonl", ".ndjson")
@@ -23,17 +24,22 @@ Row = dict[str, str]
 
 
 def is_table(uri: str) -> bool:
-    """Whether a file is a table of recordings, and no recording: it has a column `recording` (or `rig`)."""
+    """Whether a file is a table of recordings, and no recording: it has a column `recording` (or `rig`). A file that
+    cannot be read is none: its audit says why. Only its beginning (of Parquet, its end) is read."""
     suffix = _suffix(uri)
     if suffix not in TABLES:
         return False
     if suffix in (".jsonl", ".ndjson"):
         return True
-    return bool({COLUMN, "rig"} & set(_columns(uri, suffix)))
+    try:
+        return bool({COLUMN, "rig"} & set(_columns(uri, suffix)))
+    except ConfigurationError:
+        return False
 
 
 def rows(uri: str) -> Iterator[tuple[str, Row]]:
-    """(place, row) of a table; no empty cells. ConfigurationError: no column `recording`, a row without one."""
+    """(place, row) of a table; no empty cells. ConfigurationError: it cannot be read, no column `recording`, a row
+    without one."""
     suffix = _suffix(uri)
     if suffix not in (".jsonl", ".ndjson") and COLUMN not in _columns(uri, suffix):
         found = ", ".join(_columns(uri, suffix))
@@ -49,28 +55,40 @@ def rows(uri: str) -> Iterator[tuple[str, Row]]:
 
 def _columns(uri: str, suffix: str) -> list[str]:
     if suffix == ".parquet":
-        return [_column(name) for name in _parquet(uri).schema.names]
-    lines = read_bytes(uri, "cannot be read")[:_HEAD].decode("utf-8-sig", "replace").splitlines()
-    return [_column(name) for name in next(csv.reader(lines[:1], delimiter=_separator(lines[:1], suffix)), [])]
+        import pyarrow.parquet as pq
+
+        with _opened(uri) as file:
+            return [_column(name) for name in pq.read_schema(file).names]
+    line = io.StringIO(_head(uri).decode("utf-8-sig", "replace"), newline=None).readline()
+    return [_column(name) for name in next(csv.reader([line], delimiter=_separator(line, suffix)), [])]
 
 
 def _rows(uri: str, suffix: str) -> Iterator[Mapping[str, Any]]:
     if suffix == ".parquet":
-        for batch in _parquet(uri).iter_batches():
-            yield from batch.to_pylist()
+        yield from _of_parquet(uri)
         return
     try:
         text = read_bytes(uri, "cannot be read").decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ConfigurationError("is not UTF-8", file=uri, place=f"byte {error.start}") from error
-    if suffix in (".jsonl", ".ndjson"):
-        yield from _json_lines(uri, text)
-        return
-    yield from csv.DictReader(io.StringIO(text), delimiter=_separator(text.splitlines()[:1], suffix), restval="")
+    yield from _json_lines(uri, text) if suffix in (".jsonl", ".ndjson") else _of_text(uri, text, suffix)
+
+
+def _of_text(uri: str, text: str, suffix: str) -> Iterator[Mapping[str, Any]]:
+    lines = io.StringIO(text, newline=None)
+    separator = _separator(lines.readline(), suffix)
+    lines.seek(0)
+    count = 0
+    try:
+        for row in csv.DictReader(lines, delimiter=separator, restval=""):
+            count += 1
+            yield row
+    except csv.Error as error:
+        raise ConfigurationError(f"cannot be read: {error}", file=uri, place=f"row {count + 1}") from error
 
 
 def _json_lines(uri: str, text: str) -> Iterator[Mapping[str, Any]]:
-    for i, line in enumerate(text.splitlines(), 1):
+    for i, line in enumerate(io.StringIO(text, newline=None), 1):
         if not line.strip():
             continue
         try:
@@ -82,14 +100,36 @@ def _json_lines(uri: str, text: str) -> Iterator[Mapping[str, Any]]:
         yield row
 
 
-def _parquet(uri: str) -> Any:
+def _of_parquet(uri: str) -> Iterator[Mapping[str, Any]]:
     import pyarrow.parquet as pq
-    from pyarrow.lib import ArrowInvalid
+
+    with _opened(uri) as file:
+        for batch in pq.ParquetFile(file).iter_batches():
+            yield from batch.to_pylist()
+
+
+@contextmanager
+def _opened(uri: str) -> Iterator[Any]:
+    """A file from which parts are read. ConfigurationError: of the store, or of Parquet that is damaged."""
+    from fsspec.core import url_to_fs
+    from pyarrow.lib import ArrowException
 
     try:
-        return pq.ParquetFile(io.BytesIO(read_bytes(uri, "cannot be read")))
-    except ArrowInvalid as error:
-        raise ConfigurationError(f"is no Parquet table: {error}", file=uri) from error
+        fs, path = url_to_fs(uri)
+        with fs.open(path, "rb") as file:
+            yield file
+    except (ArrowException, *store_errors()) as error:
+        raise ConfigurationError(f"cannot be read: {error}", file=uri) from error
+
+
+def _head(uri: str) -> bytes:
+    from fsspec.core import url_to_fs
+
+    try:
+        fs, path = url_to_fs(uri)
+        return bytes(fs.cat_file(path, start=0, end=_HEAD))
+    except store_errors() as error:
+        raise ConfigurationError(f"cannot be read: {error}", file=uri) from error
 
 
 def _column(name: str) -> str:
@@ -98,11 +138,11 @@ def _column(name: str) -> str:
     return plain.lower() if plain.lower() in KNOWN else plain
 
 
-def _separator(head: list[str], suffix: str) -> str:
+def _separator(head: str, suffix: str) -> str:
     """Of a CSV table: a semicolon where the header has more of them than commas."""
     if suffix == ".tsv":
         return "\t"
-    return ";" if head and head[0].count(";") > head[0].count(",") else ","
+    return ";" if head.count(";") > head.count(",") else ","
 
 
 def _text(value: object) -> str:

@@ -1,10 +1,11 @@
 """Which recordings a campaign has: folders, globs, archives, tables, anywhere fsspec knows.
 
-- A folder, with the folders below it: every file that a reader knows by its suffix. Hidden files and folders are left
-  out, lakes, and what lies beside recordings (BESIDE: README.txt). A folder with a .mme file is one recording, named
-  by that file.
+- A folder, with the folders below it and those that links lead to: every file that a reader knows by its suffix.
+  Hidden files and folders are left out, lakes, and what lies beside recordings (BESIDE: README.txt). An ISO-MME test is
+  one recording, named by its .mme file: its comment file and its folders (walking.OF_A_TEST) are none of their own.
 - A glob (``s3://bucket/2025/**/*.mf4``): of what it matches, the same.
-- A ZIP archive: with one .mme file it is one recording; else every file in it as of a folder (``zip://T1.csv::a.zip``).
+- A ZIP archive: where it holds one ISO-MME test it is one recording; else every file in it as of a folder
+  (``zip://T1.csv::a.zip``).
 - A table (CSV, TSV, Parquet, JSON lines) with a column ``recording``: one row a recording. ``recording``, ``rig`` and
   ``dbc`` are relative to the table; every other column is said of the test (number, item, date, ...).
 - A recording.
@@ -14,22 +15,24 @@ Files of one recording (the rig's parts) are one, named by its first part.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from nineaudit.campaign.places import child, is_local, name_of, on_path, recording_files, split
+from nineaudit.campaign.places import child, is_local, local_path, recording_files, split
 from nineaudit.campaign.source_tables import is_table, rows
+from nineaudit.campaign.walking import GLOB, File, below, exists, is_folder, matches, opened
 from nineaudit.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from nineaudit.parts import Part
 
-_GLOB: Final = frozenset("*?[")
 BESIDE: Final = ("readme*", "license*.txt", "licence*.txt", "changelog*.txt", "*sums.txt", "thumbs.db")
 """Names, in small letters, of what lies in a folder of recordings and is none, though its suffix is that of one."""
+_EXCLUDE: Final = "leave it out with --exclude"
 
 
 @dataclass(frozen=True)
@@ -53,14 +56,16 @@ def find(
     """The recordings of the sources, in their order, each once.
 
     `parts` gives the parts of the rig of a recording. `without`: a lake, whose files are none. `exclude`: patterns of
-    what is none in folders, globs and archives, by its name or by its path.
-    ConfigurationError: a source that is not there or holds no recording, one named twice, a table that is wrong.
+    what is none in folders, globs and archives, by its name or by its path, and of folders that are not entered.
+    ConfigurationError: a source that is not there, cannot be asked or holds no recording, a recording that is named
+    twice or by a name that cannot be kept, a table that is wrong.
     """
     seen: dict[str, str] = {}
     for source in sources:
         count = 0
         for found in _as_one(_of(source, without, exclude), parts):
             count += 1
+            _require_usable(found.uri)
             if found.uri in seen:
                 first, second = seen[found.uri] or source, found.place or source
                 advice = f"it is in {first} and in {second}: name it once" if first != second else "name it once"
@@ -75,16 +80,32 @@ def find(
 
 def _of(source: str, without: str, exclude: Sequence[str]) -> Iterator[Found]:
     """What one source names."""
+    _require_usable(source)
     protocol, path, rest = split(source)
-    if _GLOB & set(path) and not _exists(source):
-        return _in_files(_matches(source), without, exclude)
-    if not _exists(source):
+    there = exists(source)
+    if GLOB & set(path) and not there:
+        return _in_files(matches(source, lambda path: _excluded(path, exclude)), without, exclude)
+    if not there:
         raise ConfigurationError("no such file or folder", file=source)
+    if is_folder(source):
+        return _in_files(below(source, lambda path: _excluded(path, exclude)), without, exclude)
     if not rest and is_table(source):
         return _in_table(source)
-    if name_of(source).lower().endswith(".zip") and protocol != "zip://":
+    if _suffix(path) == ".zip" and protocol != "zip://":
         return _in_archive(source, exclude)
-    return _in_files(_below(source), without, exclude) if _is_folder(source) else iter([Found(source)])
+    return iter([Found(source)])
+
+
+def _require_usable(uri: str) -> None:
+    """ConfigurationError: the name cannot be written into a lake, or opening the file may never end."""
+    try:
+        uri.encode()
+    except UnicodeEncodeError as error:
+        name = uri.encode(errors="backslashreplace").decode()
+        raise ConfigurationError("its name is not UTF-8", file=name, advice=f"rename it, or {_EXCLUDE}") from error
+    at = local_path(uri)
+    if is_local(uri) and not os.path.isfile(at) and not os.path.isdir(at) and os.path.exists(at):
+        raise ConfigurationError("is neither a file nor a folder", file=uri, advice=_EXCLUDE)
 
 
 def _as_one(found: Iterable[Found], parts: Callable[[Found], Sequence[Part]]) -> Iterator[Found]:
@@ -108,116 +129,41 @@ def _in_table(table: str) -> Iterator[Found]:
 
 
 def _in_archive(archive: str, exclude: Sequence[str]) -> Iterator[Found]:
-    from nineaudit.readers import READERS
-
-    inside = f"zip://::{archive}"
-    names = [name for name in _below(inside) if not _left_out(name, exclude)]
-    tests = [name for name in names if name_of(name).lower().endswith(".mme")]
-    if len(tests) == 1 and not any(_suffix(name) in READERS and name not in tests for name in names):
+    """One recording where it holds one ISO-MME test and nothing else, or cannot be opened: its reader salvages such."""
+    try:
+        files = below(f"zip://::{archive}", lambda path: _excluded(path, exclude))
+    except ConfigurationError:
         return iter([Found(archive)])
-    return _in_files(names, "", exclude)
+    found = list(_in_files(files, "", exclude))
+    headers = any(_suffix(file.path) == ".mme" for file in files)
+    channels = any("channel" in file.path.lower().split("/") for file in files)
+    one = not headers and channels if not found else len(found) == 1 and _suffix(split(found[0].uri)[1]) == ".mme"
+    return iter([Found(archive)] if one else found)
 
 
-def _left_out(uri: str, exclude: Sequence[str]) -> bool:
-    """Whether a file is no recording by its name: of those that lie beside recordings everywhere, or as asked."""
-    name, path = name_of(uri), split(uri)[1]
-    beside = any(fnmatchcase(name.lower(), one) for one in BESIDE)
-    return beside or any(fnmatchcase(name, one) or fnmatchcase(path, one) for one in exclude)
-
-
-def _in_files(names: Iterable[str], without: str, exclude: Sequence[str]) -> Iterator[Found]:
+def _in_files(files: Iterable[File], without: str, exclude: Sequence[str]) -> Iterator[Found]:
     """Those that are recordings."""
     from nineaudit.readers import READERS
 
-    for name in names:
-        if _left_out(name, exclude):
+    for uri, path in files:
+        if _suffix(path) not in READERS or _left_out(path, exclude):
             continue
-        if _suffix(name) in READERS and not (without and _absolute(name).startswith(f"{without}/")):
-            yield Found(name)
+        if "::" in path:
+            what = "its name has ::, which stands for an archive"
+            raise ConfigurationError(what, file=uri, advice=f"rename it, or {_EXCLUDE}")
+        if not (without and opened(uri)[1].startswith(f"{without}/")):
+            yield Found(uri)
 
 
-def _suffix(uri: str) -> str:
-    return PurePosixPath(name_of(uri)).suffix.lower()
+def _left_out(path: str, exclude: Sequence[str]) -> bool:
+    """Whether a file is no recording by its name: of those that lie beside recordings everywhere, or as asked."""
+    name = PurePosixPath(path).name.lower()
+    return any(fnmatchcase(name, one) for one in BESIDE) or _excluded(path, exclude)
 
 
-def _below(folder: str) -> Iterator[str]:
-    """The files of a folder and of those below it, sorted; hidden ones and lakes left out."""
-    fs, root = _opened(folder)
-    for home, folders, files in fs.walk(root, on_error=_unreadable):
-        if "lake.json" in files and "results" in folders:
-            folders.clear()
-            continue
-        for name in [name for name in folders if name.startswith(".")]:
-            _drop(folders, name)
-        yield from (_named(folder, root, f"{home.rstrip('/')}/{name}") for name in sorted(files) if name[:1] != ".")
+def _excluded(path: str, exclude: Sequence[str]) -> bool:
+    return any(fnmatchcase(PurePosixPath(path).name, one) or fnmatchcase(path, one) for one in exclude)
 
 
-def _unreadable(error: OSError) -> None:
-    """A folder that cannot be listed is not left out without a word; one that went meanwhile has nothing in it."""
-    if isinstance(error, FileNotFoundError):
-        return
-    raise ConfigurationError(f"cannot be listed: {error.strerror or error}", file=error.filename) from error
-
-
-def _drop(folders: Any, name: str) -> None:
-    """Take a folder out of a walk (a list, or a table by name)."""
-    folders.pop(name) if isinstance(folders, dict) else folders.remove(name)
-
-
-def _matches(pattern: str) -> Iterator[str]:
-    """The files that a glob matches, sorted."""
-    fs, path = _opened(pattern)
-    start = _plain(pattern)
-    home = _opened(start)[1] if start else _opened(".")[1]
-    for name in sorted(fs.glob(path)):
-        if fs.isfile(name):
-            yield _named(start, home, str(name))
-
-
-def _plain(pattern: str) -> str:
-    """The folder of a glob before its first wildcard, as it was written."""
-    protocol, path, rest = split(pattern)
-    kept = []
-    for part in path.split("/")[:-1]:
-        if _GLOB & set(part):
-            break
-        kept.append(part)
-    return f"{protocol}{'/'.join(kept)}{rest}"
-
-
-def _named(folder: str, root: str, full: str) -> str:
-    """A file as seen from a folder as the folder was written."""
-    below = full.removeprefix(root.rstrip("/")).lstrip("/")
-    if not folder or folder.endswith("://"):
-        return folder + below
-    if split(folder)[2]:
-        protocol, path, rest = split(folder)
-        return f"{protocol}{path.rstrip('/') + '/' if path else ''}{below}{rest}"
-    return on_path(folder, lambda at: at / below) if is_local(folder) else f"{folder.rstrip('/')}/{below}"
-
-
-def _opened(uri: str) -> tuple[Any, str]:
-    from fsspec.core import url_to_fs
-
-    try:
-        fs, path = url_to_fs(uri)
-    except (ImportError, ValueError, OSError) as error:
-        raise ConfigurationError(f"cannot be opened: {error}", file=uri) from error
-    return fs, str(path)
-
-
-def _exists(uri: str) -> bool:
-    fs, path = _opened(uri)
-    try:
-        return bool(fs.exists(path))
-    except OSError as error:
-        raise ConfigurationError(f"cannot be opened: {error}", file=uri) from error
-
-
-def _is_folder(uri: str) -> bool:
-    fs, path = _opened(uri)
-    return bool(fs.isdir(path))
-
-
-def _absolute(uri: str) -> str:
-    return _opened(uri)[1]
+def _suffix(path: str) -> str:
+    return PurePosixPath(path).suffix.lower()
