@@ -105,7 +105,12 @@ def _entry(real: dict[str, Any], matrix: FloatArray, number: int, tests: int, se
         "uri": f"T{number:05d}.csv",
         "key": f"{number:032x}",
         "test": {"number": f"T{number:05d}", "date": (FIRST_DAY + timedelta(3650 * number // tests)).isoformat()},
-        "result": real["result"] | {"rig": real["result"]["rig"] | {"name": f"head {rig}"}, "sensors": block},
+        "result": real["result"]
+        | {
+            "recording": real["result"]["recording"] | {"sha256": f"{number:064x}"},
+            "rig": real["result"]["rig"] | {"name": f"head {rig}"},
+            "sensors": block,
+        },
     }
 
 

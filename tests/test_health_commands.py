@@ -36,13 +36,15 @@ def called(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int,
     return int(ended.value.code or 0), shown.out, shown.err
 
 
-def surer(entry: dict[str, Any], times: float) -> dict[str, Any]:
-    """The entry as if so many equal tests spoke."""
+def surer(entry: dict[str, Any], times: float, number: int) -> dict[str, Any]:
+    """The entry as if so many equal tests spoke, of a recording of its own."""
     block = entry["result"]["sensors"]
     told = block["information"]
     eta, matrix = unpacked(told)
     more = {"eta": _text(times * eta), "matrix": _text(times * matrix[np.triu_indices(len(eta))])}
-    return entry | {"result": sealed(entry["result"] | {"sensors": block | {"information": told | more}})}
+    source = entry["result"]["recording"] | {"sha256": f"{number:064x}"}
+    sensors = block | {"information": told | more}
+    return entry | {"result": sealed(entry["result"] | {"recording": source, "sensors": sensors})}
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,7 @@ def one() -> dict[str, Any]:
 @pytest.fixture
 def lake(one: dict[str, Any], tmp_path: Path) -> Path:
     tests = [
-        surer(one, 300.0) | {"uri": f"T{i}.csv", "key": f"{i:032x}", "test": {"date": f"2026-03-{i + 1:02d}"}}
+        surer(one, 300.0, i) | {"uri": f"T{i}.csv", "key": f"{i:032x}", "test": {"date": f"2026-03-{i + 1:02d}"}}
         for i in range(8)
     ]
     lake_of(tmp_path / "lake", tests)

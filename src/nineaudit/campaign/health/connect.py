@@ -18,6 +18,8 @@ def parts(records: Sequence[Record]) -> list[Part]:
     by_rows: dict[tuple[Row, ...], list[int]] = {}
     keys: dict[tuple[object, ...], list[int]] = {}
     for i, record in enumerate(records):
+        if not record.rows:
+            continue  # its rig leaves no error open
         key = tuple((r.sensor, r.seat, r.kind, r.parameter, r.axis) for r in record.rows)
         keys.setdefault(key, []).append(i)
     for members in keys.values():

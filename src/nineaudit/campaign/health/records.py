@@ -11,7 +11,6 @@ with c the restatement (ln of the scales' ratio, difference of positions, of axe
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
@@ -20,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from nineaudit.array import FloatArray
+from nineaudit.campaign.health.identity import Names, names_of, tellers
 from nineaudit.estimate.calibration import perpendicular
 from nineaudit.report.sensors import unpacked
 from nineaudit.units import counted
@@ -96,20 +96,17 @@ class Records:
     named: frozenset[str]
     """Sensors that have a serial number."""
     first: First = field(default_factory=First)
+    names: Names = field(default_factory=Names)
+    serials: Mapping[str, str] = field(default_factory=dict)
+    """Their serial numbers, by sensor: several sensors may have one."""
 
 
 def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
     """The recordings of `entries` that tell a calibration, in order of date, else of test number, else of uri."""
-    kept, why = [], Counter[str]()
-    for entry in entries:
-        block = (entry["result"].get("sensors") or {}) if entry.get("result") else {}
-        if block.get("information"):
-            known = {**(entry["result"].get("test") or {}), **(entry.get("test") or {})}
-            kept.append((known, entry["uri"], entry["result"]["rig"]["name"], block))
-        else:
-            why[block.get("fit") or "audited by a version that did not say it, or not audited"] += 1
-    notes = [f"no calibration from {counted(count, 'recording')}: {reason}" for reason, count in sorted(why.items())]
-    days = [_day(known.get("date")) for known, *_ in kept]
+    kept, notes = tellers(entries)
+    names, taken = names_of(kept)
+    notes += taken
+    days = [_day(one.known.get("date")) for one in kept]
     dated = 2 * sum(d is not None for d in days) > len(days)
     if dated and None in days:
         notes.append(f"left out for want of a date: {counted(days.count(None), 'recording')}")
@@ -117,34 +114,41 @@ def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
         notes.append("most recordings have no date: they are in the order of their test numbers, else of their names")
     order = sorted(
         (i for i, d in enumerate(days) if d is not None or not dated),
-        key=lambda i: (days[i] if dated else 0, _natural(str(kept[i][0].get("number") or "")), _natural(kept[i][1])),
+        key=lambda i: (
+            days[i] if dated else 0,
+            _natural(str(kept[i].known.get("number") or "")),
+            _natural(kept[i].uri),
+        ),
     )
-    first, named, records = First(), set[str](), []
+    first, serials, records = First(), dict[str, str](), []
     for place, i in enumerate(order):
-        known, uri, rig, block = kept[i]
-        day = days[i]
+        one, day = kept[i], days[i]
         when = float(day) if dated and day is not None else float(place)
-        label = str(known["date"])[:10] if dated else str(known.get("number") or uri)
-        records.append(_record(uri, label, when, rig, block, first))
-        named |= {c["serial"] for c in block["channels"] if c["serial"]}
+        label = str(one.known["date"])[:10] if dated else str(one.known.get("number") or one.uri)
+        rig = names.rig(one.rig_name, one.item)
+        sensors = names.sensors(rig, one.block["channels"])
+        records.append(_record(one.uri, label, when, rig, sensors, one.block, first))
+        serials |= {sensors[c["channel"]]: str(c["serial"]) for c in one.block["channels"] if c["serial"]}
     if first.restated:
         notes.append(f"stated in other units or settings, compared as stated: {', '.join(sorted(first.restated))}")
-    return Records(records, dated, notes, frozenset(named), first)
+    return Records(records, dated, notes, frozenset(serials), first, names, serials)
 
 
-def _record(uri: str, label: str, when: float, rig: str, block: Mapping[str, Any], first: First) -> Record:
+def _record(
+    uri: str, label: str, when: float, rig: str, sensors: Mapping[str, str], block: Mapping[str, Any], first: First
+) -> Record:
     told = block["information"]
-    stated = _stated(rig, block, first)
+    stated = _stated(rig, sensors, block, first)
     eta, matrix = unpacked(told)
     eta, matrix = stated.scale * eta, stated.scale[:, None] * matrix * stated.scale
     if stated.turn is not None:
         matrix = stated.turn @ matrix @ stated.turn.T
         eta = stated.turn @ eta + matrix @ stated.moved
-    shock = {_sensor(rig, c): float(c["shock"] or 0.0) for c in block["channels"]}
+    shock = {sensors[c["channel"]]: float(c["shock"] or 0.0) for c in block["channels"]}
     return Record(uri, label, when, stated.rows, eta, matrix, shock)
 
 
-def _stated(rig: str, block: Mapping[str, Any], first: First) -> Stated:
+def _stated(rig: str, sensors: Mapping[str, str], block: Mapping[str, Any], first: First) -> Stated:
     """What the rig file says of the rows of a recording: the same for most recordings of a rig, and made once."""
     told = block["information"]
     named = ("channel", "serial", "kind", "scale", "position", "axis")
@@ -154,7 +158,7 @@ def _stated(rig: str, block: Mapping[str, Any], first: First) -> Stated:
         prior = np.array(told["prior"], dtype=np.float64)
         names = [(str(c), str(p)) for c, p in told["parameters"]]
         seats = {c: _seat(rig, channels[c], first) for c in dict.fromkeys(name for name, _ in names)}
-        rows = tuple(_row(rig, channels[c], p, u, seats[c]) for (c, p), u in zip(names, prior, strict=True))
+        rows = tuple(_row(sensors[c], channels[c], p, u, seats[c]) for (c, p), u in zip(names, prior, strict=True))
         scale = np.array([UNIT[family(row.parameter)] for row in rows]) / prior
         turn, moved = _restated(rows, channels, names, first)
         same = not moved.any() and np.array_equal(turn, np.eye(len(rows)))
@@ -162,14 +166,10 @@ def _stated(rig: str, block: Mapping[str, Any], first: First) -> Stated:
     return first.stated[key]
 
 
-def _sensor(rig: str, channel: Mapping[str, Any]) -> str:
-    return str(channel["serial"] or f"{rig}/{channel['channel']}")
-
-
-def _row(rig: str, channel: Mapping[str, Any], parameter: str, prior: float, seat: Seat) -> Row:
+def _row(sensor: str, channel: Mapping[str, Any], parameter: str, prior: float, seat: Seat) -> Row:
     axis = tuple(rounded(channel["axis"]).tolist()) if family(parameter) == "tilt" else ()
     size = float(prior) / UNIT[family(parameter)]
-    return Row(_sensor(rig, channel), seat, channel["kind"], parameter, size, axis)
+    return Row(sensor, seat, channel["kind"], parameter, size, axis)
 
 
 def _seat(rig: str, channel: Mapping[str, Any], first: First) -> Seat:
