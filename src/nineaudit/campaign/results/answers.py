@@ -7,6 +7,8 @@ import datetime as dt
 import io
 import json
 import math
+from decimal import Decimal
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -35,7 +37,8 @@ def style(wanted: str | None, output: Path | None) -> str:
 
 
 def as_text(answer: pa.Table, form: str, width: int | None = None) -> str:
-    """The answer as a table of at most `width` signs, CSV or JSON."""
+    """The answer as a table of at most `width` signs, CSV or JSON; repeated names of columns are numbered."""
+    answer = distinct(answer)
     if form == "table":
         return _table(answer, width)
     return _csv(answer) if form == "csv" else _json(answer)
@@ -48,12 +51,24 @@ def write_parquet(answer: pa.Table, path: Path) -> None:
     make_folder(path.parent)
     partial = partial_name(path)
     try:
-        pq.write_table(answer, partial)
+        pq.write_table(distinct(answer), partial)
         settle(partial, path)
     except OSError as error:
         raise unwritable(path, error) from error
     finally:
         partial.unlink(missing_ok=True)
+
+
+def distinct(answer: pa.Table) -> pa.Table:
+    """The answer with each name of a column once: uri, uri_1, as an object of JSON needs them."""
+    taken, names = set(answer.column_names), list[str]()
+    for name in answer.column_names:
+        new = name
+        if name in names:
+            new = next(other for i in count(1) if (other := f"{name}_{i}") not in taken)
+        taken.add(new)
+        names.append(new)
+    return answer.rename_columns(names)
 
 
 def _rows(answer: pa.Table) -> list[list[Any]]:
@@ -65,6 +80,8 @@ def _rows(answer: pa.Table) -> list[list[Any]]:
 def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
+    if isinstance(value, Decimal):  # what DuckDB makes of sum() of whole numbers, and of 0.1
+        return int(value) if value == value.to_integral_value() else float(value)
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -82,7 +99,7 @@ def _table(answer: pa.Table, width: int | None) -> str:
 
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for field in answer.schema:
-        right = "int" in str(field.type) or "double" in str(field.type) or "float" in str(field.type)
+        right = any(kind in str(field.type) for kind in ("int", "double", "float", "decimal"))
         shown.add_column(Text(printable(field.name)), justify="right" if right else "left", overflow="fold")
     for row in _rows(answer.slice(0, SHOWN)):
         shown.add_row(*(Text(_cell(value)) for value in row))
