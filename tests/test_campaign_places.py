@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,11 @@ import pytest
 from fsspec.core import url_to_fs
 from fsspec.implementations.memory import MemoryFileSystem
 
-from campaigns import campaign
+from campaigns import campaign, contents, entries, plan, told
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign import task
 from nineaudit.campaign.places import signature
+from nineaudit.campaign.results.compact import compact
 from nineaudit.campaign.settings import collect
 from nineaudit.campaign.waiving import unmatched
 from nineaudit.errors import ConfigurationError
@@ -162,3 +164,85 @@ def test_what_a_store_says_of_a_file_tells_that_it_changed(key: str | None, monk
     else:
         assert said[0] == said[2] != said[1]
         assert None not in said
+
+
+@pytest.fixture
+def fails(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[Exception | None], None]]:
+    """Lets files of memory:// not be fetched."""
+    fetch = MemoryFileSystem.get_file
+
+    def fail(error: Exception | None) -> None:
+        def instead(*asked: Any, **options: Any) -> None:
+            if error is not None:
+                raise error
+            fetch(*asked, **options)
+
+        monkeypatch.setattr(MemoryFileSystem, "get_file", instead)
+
+    fs, path = url_to_fs("memory://fails/T1.csv")
+    fs.pipe_file(path, Path("tests/T1.csv").read_bytes())
+    yield fail
+    fs.rm("/fails", recursive=True)
+
+
+def test_a_recording_that_cannot_be_fetched_this_time_keeps_its_entry(fails: Callable[..., None]) -> None:
+    def run(**options: Any) -> dict[str, Any]:
+        return task.audit_one("memory://fails/T1.csv", "rig.toml", lake="lake", **options)
+
+    first = run()
+    before = contents(Path("lake"), ".")
+    fails(TimeoutError("no answer"))
+    missed = run()
+    assert (missed["verdict"], missed["transient"], missed["key"]) == ("not_audited", True, first["key"])
+    assert missed["reason"] == "memory://fails/T1.csv: cannot be fetched: no answer; its result of before stands"
+    assert contents(Path("lake"), ".") == before
+    other = run(test={"number": "7"})
+    assert (other["verdict"], other["kept"]) == ("not_audited", False), "there is no result of this to stand"
+    assert entries(Path("lake"))["T1.csv"]["transient"]
+    fails(None)
+    assert run()["kept"]
+    assert contents(Path("lake"), ".") == before, "what was not finished is gone"
+
+
+def test_an_edition_is_the_newest_when_there_is_something_in_it(home: Path) -> None:
+    task.audit_one("tests/T1.csv", "rig.toml", lake="lake")
+    lake = lakes.open_lake("lake")
+    before = lakes.head(lake)
+    for sources, options in ((), {"scheduler": "typo.json"}), ((), {"shard": "3/2"}), (("tests", "missing"), {}):
+        with pytest.raises(ConfigurationError):
+            told(plan(home, *sources, select="RB301", **options))
+        assert lakes.head(lake) == before
+    assert compact(lake).recordings == 1
+    task.audit_one("tests/T1.csv", "rig.toml", lake="lake", select="RB301")
+    assert lakes.head(lake) not in (before, None)
+
+
+def test_an_edition_without_results_is_no_reason_to_empty_the_tables() -> None:
+    task.audit_one("tests/T1.csv", "rig.toml", lake="lake")
+    lake = lakes.open_lake("lake")
+    edition = lakes.head(lake)
+    compact(lake)
+    tables = contents(Path("lake"), "tables")
+    lakes.write(lake, "head.json", {"edition": "f" * 12})
+    with pytest.raises(
+        ConfigurationError, match=f"no result of its newest edition, ffffffffffff; expected .* {edition}"
+    ):
+        compact(lake)
+    assert contents(Path("lake"), "tables") == tables
+    lakes.remove(lake, "head.json")
+    assert compact(lake).edition == edition, "the first run was killed before it was told"
+
+
+def test_the_rig_is_there_where_the_inputs_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    lake, document = lakes.open_lake("lake", create=True), collect("rig.toml")
+
+    def killed(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as killing:
+        killing.setattr(lakes, "write", killed)
+        with pytest.raises(KeyboardInterrupt):
+            task.prepare(lake, document)
+    task.prepare(lake, document)
+    (rig,) = Path("lake/rigs").iterdir()
+    assert rig.read_bytes() == Path("rig.toml").read_bytes()

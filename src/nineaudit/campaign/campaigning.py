@@ -181,12 +181,16 @@ def _of_shard(found: list[Found], shard: str | None) -> list[Found]:
 
 
 def _noted(lake: Lake, done: Iterable[Summary]) -> Iterator[Summary]:
-    """The summaries as they are; what varies from run to run is written to runs/, some hundred lines at once."""
+    """The summaries as they are; what varies from run to run is written to runs/, some hundred lines at once. The
+    edition becomes the newest when there is something in it."""
     name = f"runs/{dt.datetime.now(dt.UTC):%Y%m%dT%H%M%SZ}-{uuid.uuid4().hex[:8]}"
     lines: list[str] = []
-    count = 0
+    count, newest = 0, None
     try:
         for summary in done:
+            if summary["edition"] != newest:
+                newest = summary["edition"]
+                lakes.make_newest(lake, newest)
             lines.append(json.dumps(summary, ensure_ascii=False) + "\n")
             if len(lines) == _LINES:
                 count += 1

@@ -26,19 +26,19 @@ class Damaged:
 
 
 def chosen(lake: Lake, edition: str | None) -> str:
-    """An edition of the lake by the beginning of its name, or the newest. ConfigurationError: there is none such."""
+    """An edition of the lake by the beginning of its name, or the newest. ConfigurationError: there is none such, or
+    there is no entry in it."""
     from nineaudit.campaign.lake import editions, head
 
     there = editions(lake)
     newest = head(lake)
-    if edition is None and newest is not None:
-        return newest
-    found = [name for name in there if edition is not None and name.startswith(edition)]
+    found = [name for name in there if name.startswith(edition or newest or "")]
     if len(found) == 1:
         return found[0]
-    what = f"no edition {edition}" if edition and not found else "the beginning of several editions"
+    none = f"no edition {edition}" if edition else f"no result of its newest edition, {newest}"
+    what = "several editions to choose from" if found else none
     raise ConfigurationError(
-        "has no results yet" if edition is None else what,
+        what if edition or there else "has no results yet",
         file=lake.uri,
         expected=f"one of {', '.join(there)}" if there else None,
         advice="" if there else "`nineaudit campaign run` makes them",

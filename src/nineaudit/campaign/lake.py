@@ -90,18 +90,18 @@ def edition_of(rules_sha256: str, version: str) -> str:
 
 
 def write_entry(lake: Lake, entry: Mapping[str, Any], **pointer: Any) -> None:
-    """Write an entry, then make it the current one of its uri and edition; an entry that could not be finished and was
-    current until now (`transient`) goes. `pointer`: more keys of the pointer."""
-    before = current(lake, entry["edition"], entry["uri"])
+    """Write an entry, then make it the current one of its uri and edition. `pointer`: more keys of the pointer."""
     write(lake, entry_name(entry["uri"], entry["key"]), entry)
     point(lake, entry["edition"], entry["uri"], entry["key"], **pointer)
-    if before and before.get("transient") and before["key"] != entry["key"]:
-        remove(lake, entry_name(entry["uri"], before["key"]))
 
 
 def point(lake: Lake, edition: str, uri: str, key: str, **more: Any) -> None:
-    """Make an entry the current one of its uri in an edition; `more`: other keys of the pointer."""
+    """Make an entry the current one of its uri in an edition; one that could not be finished (`transient`) and was
+    current until now goes. `more`: other keys of the pointer."""
+    before = current(lake, edition, uri)
     write(lake, _pointer(edition, uri), {"key": key, "uri": uri, **more})
+    if before and before.get("transient") and before["key"] != key:
+        remove(lake, entry_name(uri, before["key"]))
 
 
 def current(lake: Lake, edition: str, uri: str) -> dict[str, Any] | None:
@@ -147,8 +147,14 @@ def editions(lake: Lake) -> list[str]:
     return sorted({name.split("/")[1] for name in _names(lake, "editions")})
 
 
+def make_newest(lake: Lake, edition: str) -> None:
+    """Make an edition, of which there is an entry by now, the newest."""
+    if head(lake) != edition:
+        write(lake, "head.json", {"edition": edition})
+
+
 def head(lake: Lake) -> str | None:
-    """The edition of the newest run; None where there was none."""
+    """The edition of the newest run that audited something; None where there was none."""
     document = read(lake, "head.json")
     return None if document is None else str(document["edition"])
 

@@ -56,13 +56,17 @@ def audit_one(
         return _entry_of(uri, setting, test or {})
     opened = lakes.open_lake(lake, create=True)
     prepare(opened, document)
-    return audit_into(opened, uri, setting, dict(test or {}), resume, reports)
+    summary = audit_into(opened, uri, setting, dict(test or {}), resume, reports)
+    lakes.make_newest(opened, setting.edition)
+    return summary
 
 
 def audit_into(
     lake: Lake, uri: str, setting: Setting, test: dict[str, str], resume: bool = False, reports: str = "failed"
 ) -> Summary:
-    """Audit a recording into a lake, unless its entry is there; the summary of `audit_one`."""
+    """Audit a recording into a lake, unless its entry is there; the summary of `audit_one`.
+
+    Where it cannot be fetched this time, the entry of it as it was read last stays the current one."""
     require_reports(reports)
     with ExitStack() as stack:
         try:
@@ -72,12 +76,11 @@ def audit_into(
                 return known
             path = stack.enter_context(fetched(uri, setting.rig.parts))
         except OSError as error:
-            transient = not isinstance(error, FileNotFoundError)
-            return write_failure(lake, uri, setting, test, _why(error), transient=transient)
+            return _not_fetched(lake, uri, setting, test, error)
         hashes = hashes_of(path, setting)
         kept = _kept(lake, uri, key_of(hashes, setting, test), setting.edition, reports)
         summary = kept or _written(lake, uri, path, hashes, setting, test, reports)
-    if seen is not None and hashes:
+    if hashes:
         lakes.write(lake, _stat_name(uri), {"uri": uri, "signature": seen, "sha256": hashes})
     return summary
 
@@ -91,19 +94,30 @@ def _entry_of(uri: str, setting: Setting, test: Mapping[str, str]) -> dict[str, 
         return audited(uri, path, hashes_of(path, setting), setting, test)[0]
 
 
+def _not_fetched(lake: Lake, uri: str, setting: Setting, test: dict[str, str], error: OSError) -> Summary:
+    """The summary of a recording that could not be fetched. There is no new entry where it has one that holds if it is
+    as it was."""
+    if isinstance(error, FileNotFoundError):
+        return write_failure(lake, uri, setting, test, _why(error), transient=False)
+    stat = lakes.read(lake, _stat_name(uri))
+    before = stat and _kept(lake, uri, key_of(stat["sha256"], setting, test), setting.edition, "none")
+    if not before:
+        return write_failure(lake, uri, setting, test, _why(error), transient=True)
+    reason = f"{uri}: {_why(error)}; its result of before stands"
+    return {**before, "verdict": "not_audited", "gate": None, "transient": True, "reason": reason}
+
+
 def _why(error: OSError) -> str:
     """Why a recording could not be fetched."""
     return "no such file" if isinstance(error, FileNotFoundError) else f"cannot be fetched: {error}"
 
 
 def prepare(lake: Lake, document: Document) -> str:
-    """Put a setting into a lake, where workers find it, and make its edition the newest; its identity."""
+    """Put a setting into a lake, where workers find it; its identity."""
     setting, name = load(document), identity(document)
     if not lakes.exists(lake, f"inputs/{name}.json"):
-        lakes.write(lake, f"inputs/{name}.json", document)
         lakes.write_bytes(lake, f"rigs/{setting.rig.sha256}.toml", rig_bytes(document))
-    if lakes.head(lake) != setting.edition:
-        lakes.write(lake, "head.json", {"edition": setting.edition})
+        lakes.write(lake, f"inputs/{name}.json", document)  # last: where it is there, so is the rig
     return name
 
 
