@@ -198,6 +198,25 @@ def test_a_cell_that_is_too_large_is_told_where() -> None:
     assert refused("t.csv") == "t.csv: row 2: cannot be read: field larger than field limit (131072)"
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("t.csv", "recording,Number,number\nT1.csv,1,2\n", "t.csv: has a column twice; found 'number'"),
+        ("t.jsonl", '{"recording": "T1.csv", "note": "\\ud800"}\n', "t.jsonl: line 1: is no JSON: 'utf-8' codec"),
+        ("t.jsonl", '{"recording": ' + "[" * 100_000, "t.jsonl: line 1: is no JSON: maximum recursion depth"),
+    ],
+    ids=["twice", "surrogate", "deep"],
+)
+def test_a_table_that_cannot_be_meant_is_told(name: str, text: str, said: str) -> None:
+    Path(name).write_text(text, encoding="utf-8")
+    assert refused(name).startswith(said)
+
+
+def test_a_date_that_is_none_is_told() -> None:
+    pq.write_table(pa.table({"recording": ["T1.csv"], "date": pa.array([2**31 - 1], pa.date32())}), "t.parquet")
+    assert refused("t.parquet").startswith("t.parquet: cannot be read: days=2147483647")
+
+
 def test_of_a_recording_only_the_head_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     from fsspec.implementations.local import LocalFileSystem
 

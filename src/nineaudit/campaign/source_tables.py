@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import date, datetime
 from pathlib import PurePosixPath
@@ -38,12 +38,11 @@ def is_table(uri: str) -> bool:
 
 
 def rows(uri: str) -> Iterator[tuple[str, Row]]:
-    """(place, row) of a table; no empty cells. ConfigurationError: it cannot be read, no column `recording`, a row
-    without one."""
+    """(place, row) of a table; no empty cells. ConfigurationError: it cannot be read, no column `recording`, a column
+    twice, a row without a recording."""
     suffix = _suffix(uri)
-    if suffix not in (".jsonl", ".ndjson") and COLUMN not in _columns(uri, suffix):
-        found = ", ".join(_columns(uri, suffix))
-        raise ConfigurationError("has no column of recordings", file=uri, found=found, expected=f"a column {COLUMN}")
+    if suffix not in (".jsonl", ".ndjson"):
+        _require_columns(uri, _columns(uri, suffix))
     for i, row in enumerate(_rows(uri, suffix), 1):
         if None in row:
             raise ConfigurationError("a row with more cells than the header", file=uri, place=f"row {i}")
@@ -51,6 +50,15 @@ def rows(uri: str) -> Iterator[tuple[str, Row]]:
         if COLUMN not in filled:
             raise ConfigurationError("a row without a recording", file=uri, place=f"row {i}", expected=COLUMN)
         yield f"{name_of(uri)} row {i}", filled
+
+
+def _require_columns(uri: str, names: Sequence[str]) -> None:
+    if COLUMN not in names:
+        found = ", ".join(names)
+        raise ConfigurationError("has no column of recordings", file=uri, found=found, expected=f"a column {COLUMN}")
+    twice = next((name for name in names if name and names.count(name) > 1), None)
+    if twice:
+        raise ConfigurationError("has a column twice", file=uri, found=twice, advice="name them differently")
 
 
 def _columns(uri: str, suffix: str) -> list[str]:
@@ -93,7 +101,10 @@ def _json_lines(uri: str, text: str) -> Iterator[Mapping[str, Any]]:
             continue
         try:
             row = json.loads(line)
-        except ValueError as error:
+            json.dumps(
+                row, ensure_ascii=False
+            ).encode()  # half a pair of surrogates is a text to json, and to nothing else
+        except (ValueError, RecursionError) as error:
             raise ConfigurationError(f"is no JSON: {error}", file=uri, place=f"line {i}") from error
         if not isinstance(row, dict):
             raise ConfigurationError("is no object", file=uri, place=f"line {i}", expected='{"recording": ...}')
@@ -118,7 +129,7 @@ def _opened(uri: str) -> Iterator[Any]:
         fs, path = url_to_fs(uri)
         with fs.open(path, "rb") as file:
             yield file
-    except (ArrowException, *store_errors()) as error:
+    except (ArrowException, OverflowError, *store_errors()) as error:  # OverflowError: a date that Python has not
         raise ConfigurationError(f"cannot be read: {error}", file=uri) from error
 
 
