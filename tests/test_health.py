@@ -13,7 +13,7 @@ from health_campaigns import Plan, drawn, sensor_in
 from nineaudit.campaign.health.assess import State, assess, assess_records
 from nineaudit.campaign.health.connect import parts
 from nineaudit.campaign.health.look import look
-from nineaudit.campaign.health.model import Change, solve
+from nineaudit.campaign.health.model import FREE, Change, solve
 from nineaudit.campaign.health.records import read_records
 from nineaudit.campaign.health.scan import scan, threshold
 from nineaudit.campaign.health.scatter import estimate_scatter
@@ -44,6 +44,7 @@ def test_combined_likelihoods_are_the_joint_least_squares_of_all_unknowns() -> N
     normal = np.zeros((n + 2 + SMALL.tests * width,) * 2)
     right = np.zeros(len(normal))
     normal[np.arange(n), np.arange(n)] = part.prior**-2.0
+    normal[[0, 3], [0, 3]] /= 1.0 + FREE**2  # the levels of what changes
     for group in part.groups:
         for j, place in enumerate(group.index):
             design = np.zeros((width, len(normal)))
@@ -66,7 +67,8 @@ def test_a_change_that_no_recording_shows_is_nothing() -> None:
     (part,) = parts(drawn(SMALL, 1).records.records)
     found = solve(part, TAU, (Change(0, np.zeros(SMALL.tests)),))
     assert found.x[-1] == 0.0
-    np.testing.assert_allclose(found.x[:-1], solve(part, TAU).x, rtol=1e-9, atol=1e-12)
+    free = replace(part, prior=part.prior * np.where(np.arange(len(part.unknowns)) == 0, np.hypot(1.0, FREE), 1.0))
+    np.testing.assert_allclose(found.x[:-1], solve(free, TAU).x, rtol=1e-9, atol=1e-12)
 
 
 def test_two_halves_of_a_recording_say_what_the_whole_says() -> None:

@@ -4,7 +4,7 @@ records.py    entries of the lake -> likelihoods in order of time
 connect.py    likelihoods by what connects them
 model.py      the hierarchical model: sensors, seats, tests        scatter.py   how much tests differ
 crowd.py      unknowns of the same recordings, in order of time    shapes.py    how they may change
-look.py       what is seen of further changes
+look.py       what is seen of further changes                    border.py    a change more or less
 scan.py       changes with time and shock history                   select.py    which of them there are
 assess.py     verdicts        words.py    text and JSON             page.py      charts
 rig_file.py   the improved calibration as a rig file

@@ -10,6 +10,9 @@ the rig's variance is half the sensor's, half the seat's. w: mounting and temper
     Λ'_j = Λ_j − Λ_j (Λ_j + T⁻¹)⁻¹ Λ_j,    η'_j = η_j − Λ_j (Λ_j + T⁻¹)⁻¹ η_j                    (Woodbury)
     H = P⁻¹ + Σ A_jᵀ Λ'_j A_j,    H x = Σ A_jᵀ η'_j                      (least squares, Lindley & Smith 1972)
 
+The level about which something changes is as good as free, P_i (1 + FREE²): otherwise a constant error beyond the rig's
+stated u would make a change larger than it is, and a change of what is constant (scan.py).
+
 Sensors that no chain of rigs connects are solved apart (connect.py). A recording needs 16 p² bytes, p errors of its
 channels.
 """
@@ -27,6 +30,9 @@ from nineaudit.campaign.health.records import Row, Seat, family
 
 ANY_CHANGE: Final = 1e5
 """Prior standard deviation of a change, in records.UNIT: of one that no recording shows, 0 is as good as any."""
+
+FREE: Final = 100.0
+"""Standard deviation of the level of an unknown that changes, in that of its prior."""
 
 AT_ONCE: Final = 128
 """Recordings whose w is integrated out together: memory."""
@@ -145,14 +151,20 @@ def moves(group: Group, changes: Sequence[Change]) -> list[tuple[int, FloatArray
     return [(k, c.amount[group.index][:, None] * group.design[:, at[0]]) for k, c, at in here if len(at)]
 
 
+def precision(part: Part, changes: Sequence[Change]) -> FloatArray:
+    """(n,) prior information of the unknowns: of those that change, next to none."""
+    changed = np.isin(np.arange(len(part.unknowns)), [c.unknown for c in changes])
+    return np.asarray(part.prior**-2.0 / (1.0 + FREE**2 * changed))
+
+
 def solve(part: Part, tau: Scatter, changes: Sequence[Change] = ()) -> Solution:
-    """The unknowns and the changes, by the model's equations; a change has hardly a prior."""
+    """The unknowns and the changes, by the model's equations; a change and the level before it have hardly a prior."""
     from scipy.linalg import cho_factor, cho_solve
 
     n = len(part.unknowns)
     size = n + len(changes)
     normal, right = np.zeros((size, size)), np.zeros(size)
-    normal[np.arange(n), np.arange(n)] = 1.0 / part.prior**2
+    normal[np.arange(n), np.arange(n)] = precision(part, changes)
     normal[np.arange(n, size), np.arange(n, size)] = ANY_CHANGE**-2.0
     marginals = tuple(marginal(group, tau) for group in part.groups)
     for one in marginals:
@@ -180,24 +192,3 @@ def _inverse(root: FloatArray) -> FloatArray:
     half, _ = dpotri(root, lower=1)
     below = np.tril(half)
     return np.asarray(below + np.tril(below, -1).T)
-
-
-def with_change(solution: Solution, change: Change) -> Solution:
-    """The solution with one change more: its equation borders the others, the inverse changes by rank one."""
-    n, size = len(solution.part.unknowns), len(solution.x)
-    across, own, right = np.zeros(size), ANY_CHANGE**-2.0, 0.0
-    for one in solution.marginals:
-        for _, column in moves(one.group, [change]):
-            told = (one.matrix @ column[:, :, None])[:, :, 0]
-            across[one.group.at] += one.group.design.T @ told.sum(axis=0)
-            own += float(np.sum(column * told))
-            right += float(np.sum(column * one.eta))
-            for k, theirs in moves(one.group, solution.changes):
-                across[n + k] += float(np.sum(theirs * told))
-    by = np.append(-solution.cov @ across, 1.0)
-    left = own + float(across @ by[:-1])
-    far = (right - float(across @ solution.x)) / left
-    cov = np.outer(by, by / left)
-    cov[:size, :size] += solution.cov
-    changes = (*solution.changes, change)
-    return Solution(solution.part, changes, solution.marginals, np.append(solution.x, 0.0) + far * by, cov)

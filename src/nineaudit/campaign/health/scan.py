@@ -1,11 +1,18 @@
 """Does an unknown of the model change in the campaign? Score tests of steps, ramps and shock history.
 
-A change x_i → x_i + β f(t) has, with every other unknown of the model eliminated, the score and its information
+A change x_i → x_i + β f(t) has, with every other unknown of the model eliminated, the score and the information
 
-    u = Σ_j f_j A_ijᵀ (η'_j − Λ'_j A_j x̂),    I = Σ_j f_j² A_ijᵀ Λ'_j A_ij − gᵀ H⁻¹ g,    g = Σ_j f_j A_jᵀ Λ'_j A_ij
+    u_f = Σ_j f_j A_ijᵀ (η'_j − Λ'_j A_j x̂),    I_ff' = Σ_j f_j f'_j A_ijᵀ Λ'_j A_ij − g_fᵀ H⁻¹ g_f',
+    g_f = Σ_j f_j A_jᵀ Λ'_j A_ij
 
-and under no change Z = u/√I is standard normal (Rao 1948); the change itself is β = u/I. The recordings of an unknown
-are put into at most BINS runs of equal length, and shapes are constant in each:
+In H the level x_i has the prior of the rig's stated u. A constant error beyond u would pay for a change that lets the
+level fall back to 0: its gain in Z² tends to x²/(1 + I_0), I_0 the information before the change, and a shape that soon
+is constant would be found. A change shall be told by what changes alone: a free level, f' = 1, is eliminated too,
+
+    u = u_f − (I_f1/I_11) u_1,    I = I_ff − I_f1²/I_11
+
+and under no change Z = u/√I is standard normal (Rao 1948), whatever the level; the change itself is β = u/I. The
+recordings of an unknown are put into at most BINS runs of equal length, and shapes are constant in each:
 
     step       from the start of a run on                 ramp        linear in time from the start of a run on
     count      recordings before, by their number         worst       hardest shock before, by its size
@@ -15,7 +22,6 @@ Where readings scatter more than the model says, as successive ones tell (von Ne
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
 from statistics import NormalDist
@@ -34,6 +40,9 @@ PER_SENSOR: Final = 8
 """Unknowns of a sensor and its seat: gain, two tilts each, three positions."""
 SHAPES: Final = 2 * BINS
 """At most: steps at 49 places, ramps from 48, two shapes of shock history."""
+
+EVEN: Final = 6
+"""Digits of |Z| to which changes are equal, as a tilt of a sensor that never moved and its seat's: the first counts."""
 
 
 def threshold() -> float:
@@ -58,27 +67,27 @@ class Found:
     track: Track
 
 
-def scan(seen: Look, size: int, without: Collection[int] = (), margin: float = np.inf) -> list[Found]:
-    """The best change of every unknown that is seen, but those `without`, largest |Z| first and while Z² is within
-    `margin` of it. `size`: recordings of the campaign."""
+def scan(seen: Look, size: int, margin: float = np.inf) -> list[Found]:
+    """The best change of every unknown that is seen, largest |Z| first and while Z² is within `margin` of it; of what
+    the model has already nothing is left to be seen. `size`: recordings of the campaign."""
     solution = seen.solution
     residuals = [solution.residual(one) for one in solution.marginals]
-    ranked = [one for sight in seen.sights for one in _best(sight, residuals) if one.unknown not in without]
-    ranked.sort(key=lambda one: (-abs(one.z[one.top]), one.unknown))
+    ranked = [one for sight in seen.sights for one in _best(sight, residuals)]
+    ranked.sort(key=lambda one: (-round(abs(float(one.z[one.top])), EVEN), one.unknown))
     return [_found(one, size) for one in ranked if ranked[0].z[ranked[0].top] ** 2 - one.z[one.top] ** 2 < margin]
 
 
 @dataclass(frozen=True, eq=False)
 class Best:
-    """The largest |Z| of an unknown: the `place` of it in the crowd of `sight`, the shape `top` of all `z` (S,), the
-    score of it, and `each` (J,) recording's own."""
+    """The largest |Z| of an unknown: the `place` of it in the crowd of `sight`, the shape `top` of all `z` (S,), its
+    `size`, and `each` (J,) recording's own."""
 
     unknown: int
     sight: Sight
     place: int
     top: int
     z: FloatArray
-    score: float
+    size: float
     each: FloatArray
 
 
@@ -86,15 +95,18 @@ def _best(sight: Sight, residuals: list[FloatArray]) -> list[Best]:
     """Of the unknowns of a crowd of which some shape can be told from what else is unknown."""
     crowd = sight.crowd
     scores = crowd.scores(residuals)
-    starts = np.searchsorted(crowd.bin, np.arange(crowd.bins))
-    score = sight.shapes.applied(np.add.reduceat(scores, starts, axis=1))
-    seen = sight.info > LEAST_INFORMATION * np.maximum(sight.plain, 1.0)
+    by_bin = np.add.reduceat(scores, np.searchsorted(crowd.bin, np.arange(crowd.bins)), axis=1)
+    part = sight.shared / sight.level[:, None]
+    score = sight.shapes.applied(by_bin) - part * by_bin.sum(axis=1)[:, None]
+    info = sight.info - part * sight.shared
+    seen = info > LEAST_INFORMATION * np.maximum(sight.plain, 1.0)
     each = crowd.standardised(scores)
     wider = np.array([_excess(*one) for one in zip(each, crowd.weight, strict=True)])
-    z = np.where(seen, score / np.sqrt(np.where(seen, sight.info, 1.0)), 0.0) / wider[:, None]
-    tops = np.argmax(np.abs(z), axis=1)
+    info = np.where(seen, info, 1.0)
+    z = np.where(seen, score / np.sqrt(info), 0.0) / wider[:, None]
+    tops = np.argmax(np.round(np.abs(z), EVEN), axis=1)
     return [
-        Best(int(crowd.unknowns[i]), sight, i, int(tops[i]), z[i], float(score[i, tops[i]]), each[i])
+        Best(int(crowd.unknowns[i]), sight, i, int(tops[i]), z[i], float(score[i, tops[i]] / info[i, tops[i]]), each[i])
         for i in np.flatnonzero(seen.any(axis=1)).tolist()
     ]
 
@@ -114,7 +126,7 @@ def _found(one: Best, size: int) -> Found:
         earliest,
         latest,
         float(z[top]),
-        one.score / float(sight.info[one.place, top]),
+        one.size,
         amount,
         track(crowd, one.place, one.each),
     )

@@ -1,7 +1,17 @@
 """Which changes there are: the most significant first, then the rest about a model that has it.
 
-A sensor that drifts pulls the estimates of its neighbours with it; once its change is in the model, they are cleared.
-Changes that explain nearly as much, their odds within 1 : 100 of the best, are rivals: none of them is accused alone.
+A sensor that drifts pulls the estimates of its neighbours with it; once its change is in the model, they are cleared. A
+sensor may change more than once. What was taken first may be wrong by what is taken later (the third of a triad of
+which two drift; one step for one up and one down), so when nothing more is significant, each change is looked for again
+about the others: where another explains more, or none is significant, it goes, and the selection goes on without it. As
+Z² is what a change gains in 2 ln L, each of these steps makes
+
+    2 ln L − threshold² · (number of changes)
+
+larger, and the selection ends; ROUNDS is for the rest (the excess of scatter, which is estimated anew each time).
+
+Changes that explain nearly as much about the final others, their odds within 1 : 100 of the best, are rivals: none of
+them is accused alone.
 """
 
 from __future__ import annotations
@@ -11,14 +21,16 @@ from dataclasses import dataclass
 from math import log
 from typing import Final
 
-from nineaudit.campaign.health.look import look, look_again
+import numpy as np
+
+from nineaudit.campaign.health.look import Look, look, look_again, look_without
 from nineaudit.campaign.health.model import Change, Part, Scatter, Solution, solve
 from nineaudit.campaign.health.scan import Found, change, outlying, scan, threshold
 from nineaudit.campaign.health.scatter import estimate_scatter
 
 MARGIN: Final = 2.0 * log(100.0)
 """Of Z²: likelihood odds of 1 : 100."""
-MOST_CHANGES, MOST_OUTLYING = 50, 20
+MOST_CHANGES, MOST_OUTLYING, ROUNDS = 50, 20, 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +53,7 @@ class Selection:
 
 
 def select(parts: Sequence[Part], size: int) -> Selection:
-    """Forward selection in every part; `size`: recordings of the campaign.
+    """Selection in every part; `size`: recordings of the campaign.
 
     Parts have nothing in common but the scatter: each goes on until nothing in it is significant, then the scatter is
     estimated anew and all are looked at again.
@@ -49,27 +61,41 @@ def select(parts: Sequence[Part], size: int) -> Selection:
     kept, out = list(parts), list[int]()
     changes: list[list[Selected]] = [[] for _ in parts]
     scatter: Scatter | None = None
-    while True:
-        shapes = [_shapes(mine) for mine in changes]
-        scatter = estimate_scatter(kept, shapes, scatter)
-        before = sum(map(len, changes)), len(out)
+    for _ in range(ROUNDS):
+        scatter = estimate_scatter(kept, [_shapes(mine) for mine in changes], scatter)
+        before = [*map(_named, changes)], len(out)
         solutions = []
         for i in range(len(kept)):
-            kept[i], solution = _grown(kept[i], changes[i], out, scatter, size)
+            kept[i], solution = _selected(kept[i], changes[i], out, scatter, size)
             solutions.append(solution)
-        if before == (sum(map(len, changes)), len(out)):
-            final = tuple(map(tuple, changes))
-            return Selection(tuple(kept), tuple(solutions), final, scatter, tuple(sorted(out)))
+        if before == ([*map(_named, changes)], len(out)):
+            break
+    assert scatter is not None
+    return Selection(tuple(kept), tuple(solutions), tuple(map(tuple, changes)), scatter, tuple(sorted(out)))
 
 
-def _grown(part: Part, changes: list[Selected], out: list[int], scatter: Scatter, size: int) -> tuple[Part, Solution]:
-    """The part with every significant change added to `changes`, without the recordings added to `out`."""
+def _selected(
+    part: Part, changes: list[Selected], out: list[int], scatter: Scatter, size: int
+) -> tuple[Part, Solution]:
+    """The part with `changes` as they are to be, without the recordings added to `out`."""
     seen = look(solve(part, scatter, _shapes(changes)))
+    for _ in range(ROUNDS):
+        part, seen = _grown(part, seen, changes, out, scatter, size)
+        again = _reviewed(seen, changes, size)
+        if again is None:
+            break
+        seen = again
+    return part, seen.solution
+
+
+def _grown(
+    part: Part, seen: Look, changes: list[Selected], out: list[int], scatter: Scatter, size: int
+) -> tuple[Part, Look]:
+    """With every significant change added to `changes`."""
     while True:
-        known = {one.unknown for one in seen.solution.changes}
-        ranked = scan(seen, size, known, MARGIN)
+        ranked = scan(seen, size, MARGIN)
         if not ranked or abs(ranked[0].z) < threshold() or len(changes) >= MOST_CHANGES:
-            return part, seen.solution
+            return part, seen
         best = ranked[0]
         bad = outlying(best) if len(out) < MOST_OUTLYING else ()
         if len(bad):
@@ -79,6 +105,29 @@ def _grown(part: Part, changes: list[Selected], out: list[int], scatter: Scatter
         else:
             changes.append(Selected(best, tuple(ranked[1:])))
             seen = look_again(seen, change(best))
+
+
+def _reviewed(seen: Look, changes: list[Selected], size: int) -> Look | None:
+    """Each change with its rivals about the others, the weakest first; where one is not what it was taken for, the look
+    without it."""
+    n = len(seen.solution.part.unknowns)
+    sure = np.abs(seen.solution.x[n:]) / np.sqrt(np.diag(seen.solution.cov)[n:])
+    for k in np.argsort(sure, kind="stable").tolist():
+        rest = look_without(seen, k)
+        ranked, mine = scan(rest, size, MARGIN), changes[k].found
+        if not ranked or abs(ranked[0].z) < threshold() or not _same(ranked[0], mine):
+            del changes[k]
+            return rest
+        changes[k] = Selected(ranked[0], tuple(ranked[1:]))
+    return None
+
+
+def _same(one: Found, other: Found) -> bool:
+    return one.unknown == other.unknown and np.array_equal(one.amount, other.amount)
+
+
+def _named(changes: Sequence[Selected]) -> list[tuple[int, str, int]]:
+    return [(one.found.unknown, one.found.shape, one.found.first) for one in changes]
 
 
 def _shapes(changes: Sequence[Selected]) -> list[Change]:

@@ -1,0 +1,142 @@
+"""Which changes there are: of levels beyond the stated u, of sensors that change more than once, of neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import date
+
+import numpy as np
+import pytest
+
+from health_campaigns import Plan, drawn
+from nineaudit.array import FloatArray
+from nineaudit.campaign.health.assess import Health, Member, State, assess_records
+from nineaudit.campaign.health.records import Record, Records, Row
+from nineaudit.campaign.health.rig_file import improved
+from nineaudit.rig import Rig, parse_rig
+
+CHANNELS = 6
+TWINS = np.eye(CHANNELS)
+TWINS[[3, 4], [4, 3]] = 0.9
+"""Λ in which a3 and a4 are hard to tell apart."""
+TRIAD = np.eye(CHANNELS)
+TRIAD[:3, :3] = [[1.0, 0.4, -0.8], [0.4, 1.0, -0.8], [-0.8, -0.8, 1.0]]
+"""Λ in which a2 explains much of what a0 and a1 do together."""
+
+
+def campaign(
+    seed: int, tests: int, rigs: int, told: FloatArray, moved: Callable[[float], FloatArray], scatter: float = 0.2
+) -> Health:
+    """The first rig's gains go `moved` (6,), in 0.5 %, of the part of the campaign that is over."""
+    rng = np.random.default_rng(seed)
+    true, root = rng.standard_normal((rigs, CHANNELS)), np.linalg.cholesky(told)
+    records = []
+    for i in range(tests):
+        rig, day = i % rigs, date.fromordinal(date(2026, 1, 1).toordinal() + i)
+        names = [(f"S{rig}{c}", (f"rig {rig}", f"a{c}")) for c in range(CHANNELS)]
+        rows = tuple(Row(sensor, seat, "accelerometer", "gain", 1.0) for sensor, seat in names)
+        theta = true[rig] + scatter * rng.standard_normal(CHANNELS) + (moved(i / tests) if rig == 0 else 0.0)
+        eta = told @ theta + root @ rng.standard_normal(CHANNELS)
+        shock = dict.fromkeys((sensor for sensor, _ in names), 1000.0)
+        records.append(Record(f"T{i}", day.isoformat(), float(day.toordinal()), rows, eta, told, shock))
+    return assess_records(Records(records, True, [], frozenset(r.sensor for one in records for r in one.rows)))
+
+
+def accused(found: Health) -> list[Member]:
+    return [m for m in (*found.sensors, *found.seats) if m.deviations]
+
+
+def of_channel(channel: int, size: float) -> FloatArray:
+    return size * np.eye(CHANNELS)[channel]
+
+
+def levelled(seed: int, level: float, drift: float = 0.0) -> Records:
+    """S03 reads `level` too much from the first test on, and `drift` more over the first half of the campaign."""
+    records = drawn(Plan(tests=80, tell=1.5), seed).records
+    for i, one in enumerate(records.records):
+        extra = (level + drift * min(i / 40.0, 1.0)) * np.array([row.sensor == "S03" for row in one.rows])
+        records.records[i] = replace(one, eta=one.eta + one.matrix @ extra)
+    return records
+
+
+@pytest.mark.parametrize("level", [10.0, -20.0])
+def test_a_constant_error_far_beyond_the_stated_u_is_no_change(level: float) -> None:
+    """+5 % and −10 % at u = 0.5 %, of a nominal sensitivity: 5 of 5 campaigns had accused it of a drift."""
+    for seed in range(5):
+        found = assess_records(levelled(seed, level))
+        assert [m.name for m in accused(found)] == []
+        (member,) = [m for m in found.sensors if m.name == "S03"]
+        value, U = member.level["gain"]
+        assert abs(value) > 0.5 * abs(level) * 0.005
+        assert U < 0.01
+
+
+def test_a_ramp_is_found_at_its_size_whatever_the_level() -> None:
+    """6 % over the first half, of a sensor that reads right at first and of one that reads 5 % too much."""
+    for seed in range(3):
+        total = []
+        for level in (0.0, 10.0):
+            (member,) = accused(assess_records(levelled(seed, level, drift=12.0)))
+            assert member.name == "S03"
+            total.append(sum(d.value for d in member.deviations))
+            assert abs(total[-1] - 0.06) < 0.02  # U is 1 %
+        assert abs(total[1] - total[0]) < 0.001
+
+
+def test_a_sensor_that_comes_back_has_two_changes_and_its_twin_none() -> None:
+    """+4 % for a third of the campaign: S03 had +2.8 %, and S04, which is in order, −2.4 %."""
+    found = campaign(1, 480, 12, 20.0 * TWINS, lambda past: of_channel(3, 8.0 * (1 / 3 <= past < 2 / 3)))
+    (member,) = accused(found)
+    up, down = member.deviations
+    assert (member.name, up.rivals, down.rivals) == ("S03", (), ())
+    assert abs(up.value - 0.04) < up.U < 0.003
+    assert abs(down.value + 0.04) < down.U < 0.003
+    # the first tests of the rig with it and without it
+    assert up.earliest <= "2026-06-18" <= up.latest
+    assert down.earliest <= "2026-11-21" <= down.latest
+
+
+def test_the_improved_rig_has_the_level_of_now_of_a_sensor_that_came_back() -> None:
+    """Scale 1.0197 had been written for a sensor that reads right."""
+    found = campaign(1, 480, 12, 20.0 * TWINS, lambda past: of_channel(3, 8.0 * (1 / 3 <= past < 2 / 3)))
+    before = campaign(1, 480, 12, 20.0 * TWINS, lambda past: of_channel(3, 0.0 * past))
+    now, usual = (
+        next(told.value["gain"] for told in improved(health, rig_of_the_first())[1] if told.channel == "a3")
+        for health in (found, before)
+    )
+    assert abs(now - usual) < 0.002
+
+
+def rig_of_the_first() -> Rig:
+    axes = ("[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]")
+    sensors = "".join(
+        f'[[sensor]]\nchannel = "a{c}"\nkind = "accelerometer"\nserial = "S0{c}"\nposition = [{c}, 0, 0]\n'
+        f"axis = {axes[c % 3]}\n"
+        for c in range(CHANNELS)
+    )
+    units = '[units]\nlength = "mm"\nacceleration = "g_0"\n'
+    stated = "[uncertainty]\ngain = 0.005\nalignment_deg = 0.5\nposition = 0.5\n"
+    return parse_rig(f'[rig]\nname = "rig 0"\n{units}{stated}{sensors}')
+
+
+def test_two_steps_are_two_changes_not_one_that_is_too_large() -> None:
+    """+4 % twice: it had been +9.5 % ± 0.2 %."""
+    found = campaign(1, 480, 12, 20.0 * TWINS, lambda past: of_channel(3, 8.0 * (past >= 0.33) + 8.0 * (past >= 0.66)))
+    (member,) = accused(found)
+    assert (member.name, [d.shape for d in member.deviations]) == ("S03", ["step", "step"])
+    for one in member.deviations:
+        assert abs(one.value - 0.04) < one.U < 0.003
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_neighbour_that_was_taken_first_is_cleared_when_the_two_that_drift_are_known(seed: int) -> None:
+    """a0 and a1 drift by 3 %; a2 of the same triad had been first, and stayed with +0.2 % ± 0.5 %."""
+    both = of_channel(0, 6.0) + of_channel(1, 6.0)
+    found = campaign(seed, 400, 8, 4.0 * TRIAD, lambda past: both * (past >= 0.5), scatter=0.1)
+    members = accused(found)
+    assert {m.name for m in members} == {"S00", "S01"}
+    for member in members:
+        (one,) = member.deviations
+        assert (member.state, one.rivals) == (State.RECALIBRATE, ())
+        assert abs(one.value - 0.03) < 1.5 * one.U
