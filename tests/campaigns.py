@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -61,3 +62,11 @@ def noted(lake: Path) -> list[dict[str, Any]]:
     """The lines of all runs."""
     texts = (file.read_text(encoding="utf-8") for file in sorted((lake / "runs").iterdir()))
     return [json.loads(line) for text in texts for line in text.splitlines()]
+
+
+def until(true: Callable[[], object], seconds: float = 120.0) -> None:
+    """Wait until something is so."""
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it took too long"
+        time.sleep(0.05)

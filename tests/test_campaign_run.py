@@ -7,7 +7,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import replace
@@ -16,7 +15,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from campaigns import campaign, contents, entries, noted, plan, told
+from campaigns import campaign, contents, entries, noted, plan, told, until
 from nineaudit.campaign import running
 from nineaudit.campaign.guard import Limits
 from nineaudit.campaign.running import SchedulerLost
@@ -53,14 +52,6 @@ def scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     for process in reversed(made):
         process.kill()
         process.wait()
-
-
-def until(true: object, seconds: float = 120.0) -> None:
-    """Wait until something is so."""
-    end = time.monotonic() + seconds
-    while not true():  # type: ignore[operator]
-        assert time.monotonic() < end, "it took too long"
-        time.sleep(0.05)
 
 
 def test_a_campaign_is_audited_once_and_counted() -> None:

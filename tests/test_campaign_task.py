@@ -1,4 +1,4 @@
-"""The audit of one recording of a campaign: into a lake, in a process of its own, with limits."""
+"""The audit of one recording of a campaign: into a lake, or for whoever calls it."""
 
 from __future__ import annotations
 
@@ -6,44 +6,22 @@ import json
 import os
 import pickle
 import shutil
-import sys
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from campaigns import campaign, contents, entries
-from nineaudit.campaign import guard, task
 from nineaudit.campaign import lake as lakes
-from nineaudit.campaign.guard import Limits
-from nineaudit.campaign.settings import collect
+from nineaudit.campaign import task
 from nineaudit.errors import ConfigurationError
 from nineaudit.files import is_sealed
-
-linux = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(campaign(tmp_path))
     return tmp_path
-
-
-@pytest.fixture
-def requests_to(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """Performs a request of a recording in a process of its own, as a worker does."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
-    name = task.prepare(lakes.open_lake("lake", create=True), collect("rig.toml"))
-
-    def perform(uri: str, limits: Limits, function: str = "campaign_functions:harmful") -> dict[str, Any]:
-        request = {"uri": uri, "inputs": name, "lake": str(folder / "lake"), "folder": str(folder), "test": {}}
-        return guard.guarded({**request, "resume": False, "reports": "failed"}, limits, function)
-
-    yield perform
-    if guard._OWN.child is not None:
-        guard._let_go(guard._OWN.child)
 
 
 def test_an_entry_is_the_result_under_the_name_of_its_uri(folder: Path) -> None:
@@ -160,51 +138,6 @@ def test_a_waiver_for_another_recording_is_no_finding_of_this() -> None:
     )
     found = task.audit_one("tests/T1.csv", "rig.toml", waivers="w.toml")["result"]["findings"]
     assert [f["verdict"] for f in found if f["rule"] == "WV001"] == ["not_applicable"]
-
-
-@linux
-@pytest.mark.parametrize(
-    ("name", "reason", "attempts"),
-    [
-        ("crashes.csv", "ended by SIGSEGV", 2),
-        ("leaves.csv", "ended with code 7", 2),
-        ("raises.csv", "ZeroDivisionError: this is what it said", 2),
-        ("neverends.csv", "longer than 3 s", 1),
-        ("eats.csv", "more than 500 MiB of memory", 1),
-    ],
-)
-def test_harm_costs_one_recording(requests_to: Any, folder: Path, name: str, reason: str, attempts: int) -> None:
-    limits = Limits(timeout=3.0 if name == "neverends.csv" else 60.0, memory=500 * 2**20, retries=1)
-    done = requests_to(f"tests/{name}", limits)
-    assert (done["verdict"], done["transient"], done["attempts"]) == ("not_audited", True, attempts)
-    assert reason in done["reason"]
-    entry = entries(folder / "lake")[name]
-    assert entry["transient"]
-    assert reason in entry["reason"] == entry["result"]["reason"]
-    good = requests_to("tests/T1.csv", Limits())
-    assert (good["kept"], good["attempts"], good["transient"]) == (False, 1, False)
-
-
-@linux
-def test_a_pipe_without_end_is_given_up_and_tried_again_later(requests_to: Any, folder: Path) -> None:
-    os.mkfifo("tests/P.csv")
-    done = requests_to("tests/P.csv", Limits(timeout=4.0), guard.FUNCTION)
-    assert "longer than 4 s" in done["reason"]
-    Path("tests/P.csv").unlink()
-    Path("tests/T1.csv").rename("tests/P.csv")
-    later = requests_to("tests/P.csv", Limits(timeout=60.0), guard.FUNCTION)
-    assert not later["transient"]
-    assert len(contents(folder / "lake")) == 1, "the entry of the attempt goes when there is a better one"
-
-
-@linux
-def test_a_process_ends_with_the_one_that_asks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
-    child = guard.start("campaign_functions:harmful")
-    child.requests.write(json.dumps({"uri": "neverends"}) + "\n")
-    child.requests.close()
-    assert child.process.wait(timeout=60) == 0
-    child.errors.close()
 
 
 def test_a_lake_of_another_kind_is_named() -> None:

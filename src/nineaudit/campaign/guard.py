@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,6 +24,8 @@ from typing import IO, Any, Final
 FUNCTION: Final = "nineaudit.campaign.requests:perform"
 _LOOK: Final = 0.05
 """Seconds between two looks at a process."""
+_STARTING: Final = 120.0
+"""Seconds in which a process has to be ready: not counted against the time of a recording."""
 _ONE_THREAD: Final = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """The matrices are small: threads would wait for each other, and workers for threads."""
 
@@ -47,14 +50,20 @@ class Lost(Exception):
         self.again = again
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Child:
-    """A process that answers requests; its `answers` arrive line by line, None when it is gone."""
+    """A process that answers requests; its `answers` arrive line by line, None when it is gone.
+
+    `folder`: its temporary files, which go with it. `ready`: it said so; `used`: it answered a request before.
+    """
 
     process: subprocess.Popen[str]
     requests: IO[str]
     answers: queue.SimpleQueue[str | None]
     errors: IO[bytes]
+    folder: str
+    ready: bool = False
+    used: bool = False
 
 
 def start(function: str = FUNCTION) -> Child:
@@ -62,30 +71,41 @@ def start(function: str = FUNCTION) -> Child:
     reading, writing = os.pipe()
     asked, asking = os.pipe()
     errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `end`)
+    folder = tempfile.mkdtemp(prefix="nineaudit-")
     process = subprocess.Popen(
-        [sys.executable, "-m", "nineaudit.campaign.child", function],
+        [sys.executable, "-m", "nineaudit.campaign.child", function, folder],
         stdin=asked,
         stdout=writing,
         stderr=errors,
         text=True,
-        env={**os.environ, **_ONE_THREAD},
+        env={**os.environ, **_ONE_THREAD, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)},
         start_new_session=True,  # Ctrl-C is for who asks: what runs may end
     )
     os.close(writing)
     os.close(asked)
     answers: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(os.fdopen(reading, encoding="utf-8"), answers), daemon=True).start()
-    return Child(process, os.fdopen(asking, "w", encoding="utf-8"), answers, errors)
+    return Child(process, os.fdopen(asking, "w", encoding="utf-8"), answers, errors, folder)
 
 
 def ask(child: Child, request: dict[str, Any], limits: Limits) -> dict[str, Any]:
-    """The answer to a request. Lost: the process crashed, or was ended for time or memory."""
-    deadline = None if limits.timeout is None else time.monotonic() + limits.timeout
+    """The answer to a request. Lost: the process crashed, was not ready in time, or was ended for time or memory."""
+    if not child.ready:
+        _line(child, "the start of its process", Limits(timeout=_STARTING), again=True)
+        child.ready = True
     try:
         child.requests.write(json.dumps(request) + "\n")
         child.requests.flush()
     except BrokenPipeError as error:
         raise Lost(_cause(child), again=True) from error
+    answer = json.loads(_line(child, "the audit", limits, again=False))
+    child.used = True
+    return dict(answer)
+
+
+def _line(child: Child, what: str, limits: Limits, *, again: bool) -> str:
+    """The next line of a process. Lost; `again` says whether where it takes too long it may be otherwise next time."""
+    deadline = None if limits.timeout is None else time.monotonic() + limits.timeout
     while True:
         try:
             line = child.answers.get(timeout=_LOOK if limits.memory else _left(deadline))
@@ -94,20 +114,22 @@ def ask(child: Child, request: dict[str, Any], limits: Limits) -> dict[str, Any]
         if line is None:
             raise Lost(_cause(child), again=True)
         if line:
-            return dict(json.loads(line))
+            return line
         if deadline is not None and time.monotonic() >= deadline:
-            raise Lost(f"the audit took longer than {limits.timeout:g} s", again=False)
+            raise Lost(f"{what} took longer than {limits.timeout:g} s", again=again)
         if limits.memory and _memory(child) > limits.memory:
-            raise Lost(f"the audit took more than {limits.memory / 2**20:g} MiB of memory", again=False)
+            reason = f"{what} took more than {limits.memory / 2**20:g} MiB of memory"
+            raise Lost(reason, again=child.used)  # part of it may be of the recordings before
 
 
 def end(child: Child) -> None:
-    """End a process, whatever it does."""
+    """End a process, whatever it does; its temporary files go."""
     child.process.kill()
     child.process.wait()
     with suppress(BrokenPipeError):  # what it did not take in is lost with it
         child.requests.close()
     child.errors.close()
+    shutil.rmtree(child.folder, ignore_errors=True)
 
 
 _OWN = threading.local()
@@ -117,13 +139,15 @@ _OWN = threading.local()
 def guarded(request: dict[str, Any], limits: Limits, function: str = FUNCTION) -> dict[str, Any]:
     """Perform a request in the process of this thread; what cannot be done is written as not audited.
 
-    A crash is tried again `limits.retries` times; time and memory are not, for they would be the same again. The answer
-    has ``attempts``.
+    A crash is tried again `limits.retries` times; time and memory are not, for they would be the same again. But what
+    is lost in a process that has answered before, for anything but time, does not count: it may be what another
+    recording left. The answer has ``attempts``.
     """
-    attempt, reason = 0, None
-    while reason is None or attempt <= limits.retries:
+    attempt, left, reason = 0, 1 + limits.retries, ""
+    while left > 0:
         attempt += 1
         child = _own(function)
+        left -= not child.used
         try:
             answer = ask(child, request, limits)
         except Lost as lost:
