@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from nineaudit.array import FloatArray
-from nineaudit.estimate.deferred import deferred
+from nineaudit.estimate.deferred import deferred, worth
+from nineaudit.estimate.hypotheses import log_evidence
 from nineaudit.estimate.model import Data
 from nineaudit.estimate.samples import at_samples
 from nineaudit.estimate.trajectory import Fit, fit
@@ -62,6 +65,26 @@ def test_noise_is_hardly_touched() -> None:
     assert better.converged
     assert better.statistic == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / better.data.dof))
     assert error(better, omega, readings) < 1.1 * error(found, omega, readings)
+
+
+@pytest.mark.parametrize("rate", [200.0, 400.0])
+def test_a_few_steps_show_what_deferred_correction_gains(rate: float) -> None:
+    """Of a settled fit and of one that is far from it: what the truncation explains, not what settling does."""
+    found, omega, _ = smoothed(rate, duration=0.25)
+    gained = log_evidence(deferred(found)) - log_evidence(found)
+    assert gained > 10.0
+    assert worth(found) == pytest.approx(gained, rel=0.3)
+    rng = np.random.default_rng(7)
+    far = fit(found.data, found.omega + 0.05 * np.abs(omega).max() * rng.standard_normal(found.omega.shape), None, 1)
+    assert not far.converged
+    assert worth(far) == pytest.approx(gained, rel=0.3)
+
+
+def test_truncation_is_worth_nothing_where_samples_are_fine() -> None:
+    rng = np.random.default_rng(4)
+    found, *_ = smoothed(1600.0, noise=100.0 * alem77.ROUNDING * rng.standard_normal((401, 9)))
+    coarse = replace(found.data, weight=found.data.weight / 100.0)  # as noisy as it is
+    assert abs(worth(fit(coarse, found.omega))) < 1.0
 
 
 def test_three_samples_are_left_as_they_are() -> None:

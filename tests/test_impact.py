@@ -64,10 +64,10 @@ def test_a_repair_without_a_fit_has_no_impact() -> None:
     [("general", "a1y:gain=30%"), ("drop", "a0z:clipping=0.6"), ("oblique", "a3y:unknown=30%")],
 )
 def test_observed_scatter_is_the_predicted_one(motion: str, fault: str) -> None:
-    """Values after the repair less the true ones, over u, of 40 motions, instruments and noises: the scatter of a
+    """Values after the repair less the true ones, over u, of 28 motions, instruments and noises: the scatter of a
     standard normal variable within its χ² limits at 1e-4 and the 9 % to which 64 draws know u. The mean is not 0 for
     peaks, which noise raises, so u holds that bias and may be larger than the scatter, not smaller."""
-    count, off = 40, []
+    count, off = 28, []
     for seed in range(count):
         found, case, made = repaired(motion, fault, 500 + seed)
         changes, truth = impact(case, made), true_values(found, case)

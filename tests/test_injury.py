@@ -98,6 +98,23 @@ def test_hic_scales_as_the_power_of_the_acceleration_and_of_time() -> None:
     assert injury.hic(0.0 * a, t) == (0.0, t[0], t[0])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_of_many_resultants_each_has_the_values_of_its_own(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.uniform(0.2e-3, 1.8e-3, 150))
+    many = 100.0 * rng.gamma(1.5, 2.0, (7, 150)) * rng.uniform(0.0, 3.0, (7, 1))
+    for window in (0.015, 0.036):
+        alone = [injury.hic(a, time, window).value for a in many]
+        assert injury.hic_of_each(many, time, window) == pytest.approx(alone, rel=1e-14)
+    for cumulative in (False, True):
+        alone = [injury.a3ms(a, time, cumulative=cumulative) for a in many]
+        assert injury.a3ms_of_each(many, time, cumulative=cumulative) == pytest.approx(alone, rel=1e-12)
+    with pytest.raises(EstimationError, match="do not fit"):
+        injury.hic(many, time)
+    with pytest.raises(EstimationError, match="not a resultant"):
+        injury.hic_of_each(-many, time)
+
+
 def test_hic_of_20_000_samples_needs_little_memory() -> None:
     import tracemalloc
 

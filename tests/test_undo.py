@@ -216,10 +216,10 @@ def test_stated_uncertainty_of_an_undone_channel(word: str) -> None:
 def test_coverage_of_an_undone_channel(word: str) -> None:
     """Issue 3: rms error at most 1.3 of the stated u, 95 % intervals cover 95 % of the samples.
 
-    Errors are common to many samples, so that the coverage of one recording scatters: the mean of 48 is held to three
+    Errors are common to many samples, so that the coverage of one recording scatters: the mean of 32 is held to three
     of its own standard deviations. benchmarks/diagnosis.py has all kinds of fault together.
     """
-    ratios, covered = many(word, range(100, 148))
+    ratios, covered = many(word, range(100, 132))
     assert np.sqrt(np.mean(ratios**2)) < 1.3
     assert abs(covered.mean() - 0.95) < 3.0 * np.std(covered, ddof=1) / np.sqrt(len(covered))
 

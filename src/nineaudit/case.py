@@ -17,7 +17,7 @@ from nineaudit.errors import EstimationError
 from nineaudit.estimate import budget, closed_form, condense
 from nineaudit.estimate import parity as parity_of
 from nineaudit.estimate.at_their_word import at_their_word
-from nineaudit.estimate.deferred import deferred
+from nineaudit.estimate.deferred import deferred, worth
 from nineaudit.estimate.functional import smoothed
 from nineaudit.estimate.hypotheses import healthy_fit, log_evidence
 from nineaudit.estimate.model import Data
@@ -33,8 +33,9 @@ from nineaudit.zeroed import Zeroed
 
 CFC_TO_PASS_BAND = 0.6
 """CFC number over its −3 dB frequency: the class is 1000 for 1650 Hz (SAE J211-1)."""
-COARSE = 0.1
-"""Part of a fault's evidence that the truncation of the midpoint rule must reach to be looked into."""
+COARSE, PROMISING = 0.1, 0.5
+"""Part of a fault's evidence that the truncation of the midpoint rule must reach to be looked into; part of that which
+its first steps must show."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,9 +158,11 @@ class Case(Zeroed):
         found = search(self.healthy, self.onset, self.flagged_blocks, self.statistic_limit)
         if not found.found or found.found[0].evidence < DETECTION_NATS:
             return found
+        needed = max(COARSE * found.found[0].evidence, DETECTION_NATS)
+        if worth(self.healthy) < PROMISING * needed:
+            return found
         fine = deferred(self.healthy)
-        gained = log_evidence(fine) - log_evidence(self.healthy)
-        if not fine.converged or gained < max(COARSE * found.found[0].evidence, DETECTION_NATS):
+        if not fine.converged or log_evidence(fine) - log_evidence(self.healthy) < needed:
             return found
         return search(fine, self.onset, self.flagged_blocks, self.statistic_limit)
 

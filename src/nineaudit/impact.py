@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,21 +50,26 @@ def reported(case: Case, time: FloatArray, motion: Motion) -> dict[str, float]:
 
     At the array's origin where the rig names no point. A single point's values carry no name of it.
     """
+    return {name: float(values[0]) for name, values in _of_each(case, time, [motion]).items()}
+
+
+def _of_each(case: Case, time: FloatArray, motions: Sequence[Motion]) -> dict[str, FloatArray]:
+    """The values (s,) of reported() for motions with one time base."""
     out = {
-        "peak α": injury.peak(motion.alpha, time)[0],
-        "peak ω": injury.peak(motion.omega, time)[0],
-        "BrIC": injury.bric(motion.omega),
+        "peak α": np.array([injury.peak(m.alpha, time)[0] for m in motions]),
+        "peak ω": np.array([injury.peak(m.omega, time)[0] for m in motions]),
+        "BrIC": np.array([injury.bric(m.omega) for m in motions]),
     }
     points = [(p.name, p.position) for p in case.recording.rig.points] or [("", np.zeros(3))]
     for name, position in points:
-        a = rigid_body.acceleration_at(position, motion.a0, motion.alpha, motion.omega)
-        resultant = kinematics.resultant(a)
+        at = [rigid_body.acceleration_at(position, m.a0, m.alpha, m.omega) for m in motions]
+        resultants = np.array([kinematics.resultant(a) for a in at])
         suffix = f" {name}" if len(points) > 1 else ""
-        out[f"peak a{suffix}"] = float(resultant.max()) / G0
-        out[f"HIC15{suffix}"] = injury.hic(resultant, time, 0.015).value
-        out[f"HIC36{suffix}"] = injury.hic(resultant, time, 0.036).value
-        out[f"GSI{suffix}"] = injury.gsi(resultant, time)
-        out[f"a3ms{suffix}"] = injury.a3ms(resultant, time) / G0
+        out[f"peak a{suffix}"] = resultants.max(axis=1) / G0
+        out[f"HIC15{suffix}"] = injury.hic_of_each(resultants, time, 0.015)
+        out[f"HIC36{suffix}"] = injury.hic_of_each(resultants, time, 0.036)
+        out[f"GSI{suffix}"] = np.array([injury.gsi(resultant, time) for resultant in resultants])
+        out[f"a3ms{suffix}"] = injury.a3ms_of_each(resultants, time) / G0
     return out
 
 
@@ -87,13 +92,13 @@ def impact(case: Case, repair: Reconstruction) -> Mapping[str, Impact]:
     after = reported(case, case.time, _motion(repair.fit, case.time, readings, case.sigma))
     means, rng = block_means(readings, blocks.length), np.random.default_rng(SEED)
     itself = reported(case, blocks.time, _motion(repair.fit, blocks.time, means, blocks.sigma))
-    squares = dict.fromkeys(itself, 0.0)
+    motions = []
     for drawn in draws(repair.fit, DRAWS, rng):
         noisy = means + blocks.sigma * rng.standard_normal(means.shape)
-        motion = _motion(drawn, blocks.time, noisy, blocks.sigma, repair.fit)
-        for name, value in reported(case, blocks.time, motion).items():
-            squares[name] += (value - itself[name]) ** 2 / DRAWS
-    return {name: Impact(before[name], after[name], squares[name] ** 0.5, unit_of(name)) for name in after}
+        motions.append(_motion(drawn, blocks.time, noisy, blocks.sigma, repair.fit))
+    drawn_values = _of_each(case, blocks.time, motions)
+    u = {name: float(np.sqrt(np.mean((drawn_values[name] - value) ** 2))) for name, value in itself.items()}
+    return {name: Impact(before[name], after[name], u[name], unit_of(name)) for name in after}
 
 
 def _as_fitted(case: Case, repair: Reconstruction) -> FloatArray:

@@ -26,8 +26,7 @@ from nineaudit.estimate.start import first_omega
 from nineaudit.estimate.trajectory import ROUGH, Fit, fit, log_determinant
 
 HOPELESS = 10.0
-"""Cost per degree of freedom at which a fit that has not fallen below it in three steps need not go on: all evidence is
-relative, and a record that costs so much is not that of a healthy instrument."""
+"""Cost per degree of freedom at which one of two fits that has not fallen below it in three steps need not go on."""
 ELSEWHERE = ("gain", "delay", "wrong_filter")
 """Kinds that a large fault has in refitted.py, or whose shape is mostly the noise of the prediction."""
 LOOK = 8
@@ -54,11 +53,12 @@ def healthy_fit(data: Data) -> Fit:
 
     Products of ω do not tell its sign: with neither rest nor rate sensors the fit starts again from −ω (METHODS.md 2).
     """
-    found = fit(data, first_omega(data), hopeless=HOPELESS * data.dof)
     if (data.still > 0).any() or has_rates(data.array):
-        return found
+        return fit(data, first_omega(data))
+    found = fit(data, first_omega(data), hopeless=HOPELESS * data.dof)
     other = fit(data, -found.omega, hopeless=HOPELESS * data.dof)
-    return min(found, other, key=lambda f: f.cost)
+    best = min(found, other, key=lambda f: f.cost)
+    return best if best.converged else fit(data, best.omega, best.theta)
 
 
 def log_evidence(found: Fit) -> float:

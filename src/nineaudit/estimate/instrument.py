@@ -8,6 +8,7 @@ Sensor by sensor along rows, time along columns, so that whole records are a few
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,12 +27,12 @@ class Instrument:
     across: FloatArray
     gain: FloatArray
 
-    @property
+    @cached_property
     def lever(self) -> FloatArray:
         """(k,3) r × n, what α is felt with; zero for rate sensors."""
         return np.where(self.held[:, None], np.cross(self.positions, self.axes), 0.0)
 
-    @property
+    @cached_property
     def axes_a(self) -> FloatArray:
         """(k,3) axes of the accelerometers, zero for rate sensors."""
         return np.where(self.held[:, None], self.axes, 0.0)

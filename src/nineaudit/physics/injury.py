@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from nineaudit.array import FloatArray
+from nineaudit.array import FloatArray, IntArray
 from nineaudit.errors import EstimationError
 from nineaudit.units import G0
 
@@ -22,9 +22,10 @@ class Window(NamedTuple):
     end: float
 
 
-def _checked(acceleration: FloatArray, time: FloatArray) -> FloatArray:
-    """The resultant in g; EstimationError unless (n,) finite, not negative, time increasing, n ≥ 2."""
-    if acceleration.shape != time.shape or time.ndim != 1 or time.size < 2 or not (np.diff(time) > 0.0).all():
+def _checked(acceleration: FloatArray, time: FloatArray, dimensions: int = 1) -> FloatArray:
+    """The resultant, or several (s,n), in g; EstimationError unless finite, not negative, time increasing, n ≥ 2."""
+    shape = acceleration.shape[-1:] if acceleration.ndim == dimensions else None
+    if shape != time.shape or time.size < 2 or not (np.diff(time) > 0.0).all():
         raise EstimationError(
             "resultant and time base do not fit",
             found=(acceleration.shape, time.shape),
@@ -36,8 +37,9 @@ def _checked(acceleration: FloatArray, time: FloatArray) -> FloatArray:
 
 
 def _trapezoid(values: FloatArray, time: FloatArray) -> FloatArray:
-    """Cumulative trapezoidal integral, 0 at the first sample (the rule that J211 users apply)."""
-    return np.concatenate([[0.0], np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2.0)])
+    """Cumulative trapezoidal integral (...,n), 0 at the first sample (the rule that J211 users apply)."""
+    parts = np.diff(time) * (values[..., 1:] + values[..., :-1]) / 2.0
+    return np.concatenate([np.zeros((*values.shape[:-1], 1)), np.cumsum(parts, axis=-1)], axis=-1)
 
 
 def hic(acceleration: FloatArray, time: FloatArray, window: float = 0.015) -> Window:
@@ -47,23 +49,36 @@ def hic(acceleration: FloatArray, time: FloatArray, window: float = 0.015) -> Wi
     [METHODS.md 6], over all pairs of samples; n × (samples in the window) operations, memory O(n).
     `window` in s: 0.015 (HIC15) or 0.036 (HIC36). Raises EstimationError for a signal that is no resultant.
     """
-    velocity = _trapezoid(_checked(acceleration, time), time)
-    # HIC = [Δv Δt^-0.6]^2.5: the bracket is maximised; powers are taken only where they could beat the best.
-    best, start, end = 0.0, 0, 0
+    best, start, end = _windows(_checked(acceleration, time)[None], time, window)
+    return Window(float(best[0]) ** 2.5, float(time[start[0]]), float(time[end[0]]))
+
+
+def hic_of_each(accelerations: FloatArray, time: FloatArray, window: float = 0.015) -> FloatArray:
+    """The values (s,) of hic() for resultants (s,n) with one time base."""
+    return np.asarray(_windows(_checked(accelerations, time, 2), time, window)[0] ** 2.5)
+
+
+def _windows(resultants: FloatArray, time: FloatArray, window: float) -> tuple[FloatArray, IntArray, IntArray]:
+    """Of resultants (s,n) in g, HIC = [Δv Δt^-0.6]^2.5: the largest bracket, first and last sample of its window."""
+    velocity = _trapezoid(resultants, time)
+    each = np.arange(len(velocity))
+    best, start, end = np.zeros(len(each)), np.zeros(len(each), dtype=np.intp), np.zeros(len(each), dtype=np.intp)
     for lag in range(1, time.size):
         duration = time[lag:] - time[:-lag]
         shortest = float(duration.min())
         if shortest > window * (1.0 + 1e-9):
             break
-        gained = velocity[lag:] - velocity[:-lag]
-        hopeful = np.flatnonzero(gained > best * shortest**0.6)
+        gained = velocity[:, lag:] - velocity[:, :-lag]
+        hopeful = np.flatnonzero((gained > best[:, None] * shortest**0.6).any(axis=0))  # powers only for these
         hopeful = hopeful[duration[hopeful] <= window * (1.0 + 1e-9)]
-        if hopeful.size:
-            scores = gained[hopeful] * duration[hopeful] ** -0.6
-            top = int(np.argmax(scores))
-            if scores[top] > best:
-                best, start, end = float(scores[top]), int(hopeful[top]), int(hopeful[top]) + lag
-    return Window(best**2.5, float(time[start]), float(time[end]))
+        if not hopeful.size:
+            continue
+        scores = gained[:, hopeful] * duration[hopeful] ** -0.6
+        top = np.argmax(scores, axis=1)
+        better = scores[each, top] > best
+        best[better] = scores[each, top][better]
+        start[better], end[better] = hopeful[top[better]], hopeful[top[better]] + lag
+    return best, start, end
 
 
 def gsi(acceleration: FloatArray, time: FloatArray) -> float:
@@ -82,28 +97,40 @@ def a3ms(acceleration: FloatArray, time: FloatArray, duration: float = 0.003, *,
     no resultant or a record shorter than `duration`.
     """
     _checked(acceleration, time)
+    return float(a3ms_of_each(acceleration[None], time, duration, cumulative=cumulative)[0])
+
+
+def a3ms_of_each(
+    accelerations: FloatArray, time: FloatArray, duration: float = 0.003, *, cumulative: bool = False
+) -> FloatArray:
+    """The values (s,) of a3ms() for resultants (s,n) with one time base."""
+    _checked(accelerations, time, 2)
     if time[-1] - time[0] < duration:
         raise EstimationError(
             "record is shorter than the window",
             found=f"{time[-1] - time[0]:g} s",
             expected=f"≥ {duration:g} s",
         )
-    low, high = float(acceleration.min()), float(acceleration.max())
+    low, high = accelerations.min(axis=1), accelerations.max(axis=1)
     for _ in range(60):
         level = (low + high) / 2.0
-        held = _time_above(acceleration, time, level)
-        longest = held.sum() if cumulative else held.max()
-        low, high = (level, high) if longest >= duration else (low, level)
-    return low
+        held = _time_above(accelerations, time, level)
+        longest = held.sum(axis=1) if cumulative else held.max(axis=1)
+        low, high = np.where(longest >= duration, (level, high), (low, level))
+    return np.asarray(low)
 
 
-def _time_above(values: FloatArray, time: FloatArray, level: float) -> FloatArray:
-    """Durations (s) of the runs at or above a level, lines between samples; zeros among them."""
-    lower, upper = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
+def _time_above(values: FloatArray, time: FloatArray, level: FloatArray) -> FloatArray:
+    """(s,n) durations (s) of the runs of values (s,n) at or above a level (s,), lines between samples; zeros among
+    them."""
+    level = level[:, None]
+    lower, upper = np.minimum(values[:, 1:], values[:, :-1]), np.maximum(values[:, 1:], values[:, :-1])
     rise = np.where(upper > lower, upper - lower, 1.0)
     part = np.where(lower >= level, 1.0, np.clip((upper - level) / rise, 0.0, 1.0))
-    run = np.cumsum(values < level)[:-1]  # a sample below ends a run
-    return np.asarray(np.bincount(run, weights=part * np.diff(time)), dtype=np.float64)
+    run = np.cumsum(values < level, axis=1)[:, :-1]  # a sample below ends a run
+    of_row = run + len(time) * np.arange(len(values))[:, None]
+    lasting = np.bincount(of_row.ravel(), (part * np.diff(time)).ravel(), values.size)
+    return np.asarray(lasting.reshape(values.shape), dtype=np.float64)
 
 
 def bric(omega: FloatArray, critical: tuple[float, float, float] = BRIC_CRITICAL) -> float:
