@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,7 +21,7 @@ import pytest
 from campaigns import campaign, contents, entries, until
 from nineaudit.campaign import guard, task
 from nineaudit.campaign import lake as lakes
-from nineaudit.campaign.guard import Limits
+from nineaudit.campaign.guard import NO_LIMITS, Limits
 from nineaudit.campaign.settings import collect
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -49,8 +52,10 @@ def requests_to(folder: Path) -> Any:
     """Performs a request of a recording in a process of its own, as a worker does."""
     name = task.prepare(lakes.open_lake("lake", create=True), collect("rig.toml"))
 
-    def perform(uri: str, limits: Limits, function: str = "campaign_functions:harmful") -> dict[str, Any]:
-        request = {"uri": uri, "inputs": name, "lake": str(folder / "lake"), "folder": str(folder), "test": {}}
+    def perform(
+        uri: str, limits: Limits = NO_LIMITS, function: str = "campaign_functions:harmful", home: Path = folder
+    ) -> dict[str, Any]:
+        request = {"uri": uri, "inputs": name, "lake": str(folder / "lake"), "folder": str(home), "test": {}}
         return guard.guarded({**request, "resume": False, "reports": "failed"}, limits, function)
 
     return perform
@@ -74,7 +79,7 @@ def test_harm_costs_one_recording(requests_to: Any, folder: Path, name: str, rea
     entry = entries(folder / "lake")[name]
     assert entry["transient"]
     assert reason in entry["reason"] == entry["result"]["reason"]
-    good = requests_to("tests/T1.csv", Limits())
+    good = requests_to("tests/T1.csv")
     assert (good["kept"], good["attempts"], good["transient"]) == (False, 1, False)
 
 
@@ -95,6 +100,25 @@ def test_a_process_ends_with_the_one_that_asks() -> None:
     child.requests.close()
     assert child.process.wait(timeout=60) == 0
     child.errors.close()
+
+
+@pytest.mark.parametrize("uri", ["T.csv", "zip://T.csv::year.zip", "zip://T.csv::file://year.zip"])
+def test_a_name_is_meant_as_seen_from_the_folder_of_its_run(requests_to: Any, folder: Path, uri: str) -> None:
+    for name in ("T1", "T2"):
+        (folder / name).mkdir()
+        shutil.copy(f"tests/{name}.csv", f"{name}/T.csv")
+        with zipfile.ZipFile(f"{name}/year.zip", "w") as archive:
+            archive.write(f"tests/{name}.csv", "T.csv")
+    first = requests_to(uri, home=folder / "T1")
+    child = guard._OWN.child
+    for name, key in (("T1", first["key"]), ("T2", task.audit_one("T2/T.csv", "rig.toml")["key"])):
+        done = requests_to(uri, home=folder / name)
+        assert (done["verdict"] == "not_audited", done["key"]) == (False, key)
+    gone = requests_to(uri, home=folder / "T3")
+    assert (gone["verdict"], gone["transient"], gone["attempts"]) == ("not_audited", True, 1)
+    assert f"worker {socket.gethostname()} does not see the folder {folder / 'T3'}" in gone["reason"]
+    assert requests_to(str(folder / "T1" / "T.csv"), home=folder / "T3")["key"] == first["key"]
+    assert guard._OWN.child is child
 
 
 @pytest.mark.parametrize("name", ["neverends", "crashes", "eats"])

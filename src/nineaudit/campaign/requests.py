@@ -7,14 +7,14 @@ A request is plain data, so that it can be sent: {"uri", "inputs" (identity of t
 from __future__ import annotations
 
 import os
+import socket
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign import task
 from nineaudit.campaign.lake import Lake
-from nineaudit.campaign.places import is_local
+from nineaudit.campaign.places import is_local, local_path
 from nineaudit.campaign.settings import Document, load
 from nineaudit.errors import ConfigurationError
 
@@ -22,9 +22,10 @@ Request = dict[str, Any]
 
 
 def perform(request: Request) -> task.Summary:
-    """Audit the recording of a request into its lake. ConfigurationError: the lake or its inputs are not there."""
-    if is_local(request["uri"]) and Path(request["folder"]).is_dir():
-        os.chdir(request["folder"])
+    """Audit the recording of a request into its lake, by its name as seen from the folder of the request; not audited
+    where that is not here. ConfigurationError: the lake or its inputs are not there."""
+    if not _entered(request["folder"]) and _is_relative(request["uri"]):
+        return give_up(request, f"worker {socket.gethostname()} does not see the folder {request['folder']}")
     lake, document = _lake(request["lake"]), _inputs(request["lake"], request["inputs"])
     return task.audit_into(lake, request["uri"], load(document), request["test"], request["resume"], request["reports"])
 
@@ -34,6 +35,21 @@ def give_up(request: Request, reason: str) -> task.Summary:
     document = _inputs(request["lake"], request["inputs"])
     lake = _lake(request["lake"])
     return task.write_failure(lake, request["uri"], load(document), request["test"], reason, transient=True)
+
+
+def _entered(folder: str) -> bool:
+    """Make a folder the current one, if it can be."""
+    try:
+        os.chdir(folder)
+    except OSError:
+        return False
+    return True
+
+
+def _is_relative(uri: str) -> bool:
+    """Whether a recording, or the archive that it is in, is named as seen from a folder."""
+    outermost = uri.rpartition("::")[2]
+    return is_local(outermost) and not local_path(outermost).is_absolute()
 
 
 @lru_cache(maxsize=4)
