@@ -15,6 +15,7 @@ import nineaudit as na
 from health_entries import Entry, entry
 from nineaudit.campaign.health.assess import Health, State, assess
 from nineaudit.campaign.health.identity import of_rig_file
+from nineaudit.campaign.health.page import section
 from nineaudit.campaign.health.records import read_records
 from nineaudit.campaign.health.words import text_table
 from nineaudit.campaign.task import audit_one
@@ -115,6 +116,9 @@ def test_one_axis_of_a_triaxial_sensor_is_named() -> None:
     assert member.seats == (("head", "a1"),)
     assert noted(found, "on several channels").endswith(": 4711")
     assert "4711 accelerometer 2 (a1 of head): gain +" in text_table(found)
+    charts = section(found).charts
+    assert charts[1].title.startswith("Gain of 4711 accelerometer 2 (a1 of head)")
+    assert "4711 acce… 2" in [name for _, name in charts[0].across]
 
 
 def test_an_accelerometer_and_a_gyroscope_of_one_serial_number_are_two() -> None:
@@ -169,6 +173,13 @@ def test_items_divide_rigs_of_one_name(serials: tuple[str, str]) -> None:
     assert {seat[0] for m in found.seats for seat in m.seats} == {"3-2-2-2 array [4711]", "3-2-2-2 array [4712]"}
     assert len(found.sensors) == len(found.seats) == 12
     assert not any("taken as one rig" in note for note in found.notes)
+
+
+def test_tests_without_an_item_are_of_a_rig_of_their_own() -> None:
+    rest = [entry(i, {}, rig="3-2-2-2 array") for i in range(60, 63)]
+    found = assess([*two_dummies(("4711", "4712"), ("A", "B")), *rest])
+    assert noted(found, "for want of the item's serial number").endswith(": 3-2-2-2 array")
+    assert {m.tests for m in found.seats if m.seats[0][0] == "3-2-2-2 array"} <= {3}
 
 
 def test_rig_files_of_one_name_are_told() -> None:

@@ -200,13 +200,15 @@ def _shared(found: Sequence[Told]) -> dict[tuple[str, str], int]:
 
 
 def _one_name(found: Sequence[Told], names: Names) -> list[str]:
-    """A note on rigs of several rig files."""
+    """Notes on rigs of several rig files, and on what is left where others of the name are divided."""
     files: dict[str, set[str]] = defaultdict(set)
     for one in found:
         files[names.rig(one.rig_name, one.item)] |= {one.rig_sha256} - {""}
     said = [f"{rig} ({len(of)} rig files)" for rig, of in sorted(files.items()) if len(of) > 1]
     advice = "where they are several, name them apart ([rig] name, or item_serial of [test])"
-    return [f"taken as one rig that was stated anew: {_some(said)}; {advice}"] if said else []
+    notes = [f"taken as one rig that was stated anew: {_some(said)}; {advice}"] if said else []
+    rest = sorted(names.divided & files.keys())
+    return [*notes, f"a rig of its own, for want of the item's serial number: {_some(rest)}"] if rest else notes
 
 
 def _counts(channels: Iterable[Mapping[str, Any]]) -> Counter[tuple[str, str]]:

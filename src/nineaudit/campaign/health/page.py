@@ -130,9 +130,9 @@ def _marks(members: Sequence[Member], health: Health) -> tuple[tuple[float, str]
 
 
 def short(member: Member) -> str:
-    """A name for an axis: of a sensor without a serial number its channel."""
+    """A name for an axis: of a sensor without a serial number its channel. The end tells those of one serial number."""
     name = member.name if member.serial or not member.seats else member.seats[0][1]
-    return printable(name if len(name) <= SIGNS else f"{name[: SIGNS - 1]}…")
+    return printable(name if len(name) <= SIGNS else f"{name[: SIGNS - 3]}…{name[-2:]}")
 
 
 def _ticks(when: FloatArray, dated: bool) -> tuple[tuple[float, str], ...]:
