@@ -72,6 +72,18 @@ def test_a_constant_error_far_beyond_the_stated_u_is_no_change(level: float) -> 
         assert U < 0.01
 
 
+def test_where_all_errors_are_far_beyond_the_stated_u_only_what_drifts_is_accused() -> None:
+    """Levels of 10 u by standard deviation: half of all sensors had been accused."""
+    for seed in range(3):
+        records = drawn(Plan(tests=120, tell=1.5), seed, drift=8.0, culprit="S17").records
+        level = 10.0 * np.random.default_rng(seed).standard_normal(40)
+        for i, one in enumerate(records.records):
+            extra = np.array([level[int(row.sensor[1:])] for row in one.rows])
+            records.records[i] = replace(one, eta=one.eta + one.matrix @ extra)
+        (member,) = accused(assess_records(records))
+        assert member.name == "S17"
+
+
 def test_a_ramp_is_found_at_its_size_whatever_the_level() -> None:
     """6 % over the first half, of a sensor that reads right at first and of one that reads 5 % too much."""
     for seed in range(3):
