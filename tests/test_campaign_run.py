@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +17,7 @@ import pytest
 from campaigns import campaign, contents, entries, noted, plan, told, until
 from nineaudit.campaign import running
 from nineaudit.campaign.guard import Limits
+from nineaudit.campaign.requests import Request
 from nineaudit.campaign.running import SchedulerLost
 from nineaudit.errors import ConfigurationError
 
@@ -113,6 +113,7 @@ def test_a_killed_scheduler_loses_nothing_and_the_lake_comes_out_the_same(
         _, said = run.communicate(timeout=120)
     assert run.returncode == 3, said
     assert "the scheduler went away" in said
+    assert "Traceback" not in said
     assert "--resume" in said
     done = contents(Path("lake"))
     assert len(done) == 3
@@ -218,17 +219,32 @@ def test_a_stream_that_closes_is_a_lost_scheduler_where_it_does_not_answer(
         if not answers:
             raise OSError("connection refused")
 
-    client = SimpleNamespace(status="running", sync=asked, scheduler=SimpleNamespace(identity=None))
-    monkeypatch.setattr(running, "_client", lambda *_: nullcontext(client))
+    def close() -> None:
+        raise TimeoutError("nobody to say it to")
+
+    client = SimpleNamespace(status="running", sync=asked, scheduler=SimpleNamespace(identity=None), close=close)
+    monkeypatch.setattr(running, "_connected", lambda *_: client)
     monkeypatch.setattr(running, "_windowed", lambda *_: _closes())
     with pytest.raises(raised):
-        list(running.run([]))
+        list(running.run([], "tcp://10.0.0.5:8786"))
     assert SchedulerLost.exit_code == 3
 
 
 def _closes() -> Iterator[None]:
     raise OSError("stream is closed")
     yield
+
+
+def test_a_request_that_is_wrong_costs_none_of_those_before_it() -> None:
+    def requests() -> Iterator[Request]:
+        yield from ({"uri": f"T{i}"} for i in range(3))
+        raise ConfigurationError("cannot read the rig file", file="none.toml")
+
+    done = []
+    with pytest.raises(ConfigurationError, match=r"none\.toml"):  # noqa: PT012 (what came before is looked at)
+        for summary in running.run(requests(), workers=2, function="campaign_functions:answers"):
+            done.append(summary["uri"])
+    assert sorted(done) == ["T0", "T1", "T2"]
 
 
 def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ import time
 import uuid
 from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -58,12 +58,14 @@ def run(
 
     `scheduler`: ``local`` (with `workers` processes; default: one a core), an address (``tcp://...``) or a scheduler
     file. `function` (``module:name``) does the work, in a process of its own. A recording whose worker dies is tried
-    again by Dask, at last alone, then written as not audited. ConfigurationError: no such scheduler; SchedulerLost.
+    again by Dask, at last alone, then written as not audited. ConfigurationError: no such scheduler, or one of a
+    request, which is raised when those before it are done; SchedulerLost.
     """
+    wrong: list[NineauditError] = []
+    suspects: list[Suspect] = []
     with _client(scheduler, workers, limits) as client:
         try:
-            suspects: list[Suspect] = []
-            yield from _windowed(client, scheduler, iter(requests), limits, function, suspects)
+            yield from _windowed(client, scheduler, _until_wrong(requests, wrong), limits, function, suspects)
             for request, _ in suspects:  # one at a time: who dies now dies by its own recording
                 again: list[Suspect] = []
                 yield from _windowed(client, scheduler, iter([request]), limits, function, again)
@@ -74,6 +76,16 @@ def run(
             if _gone(client):
                 raise _lost(scheduler) from error
             raise
+    if wrong:
+        raise wrong[0]
+
+
+def _until_wrong(requests: Iterable[Request], wrong: list[NineauditError]) -> Iterator[Request]:
+    """The requests up to one that cannot be made, whose error is put to `wrong`."""
+    try:
+        yield from requests
+    except NineauditError as error:
+        wrong.append(error)
 
 
 def perform(request: Request, limits: Limits, function: str) -> Summary:
@@ -174,8 +186,10 @@ def _window(client: Client) -> int:
 def _client(scheduler: str, workers: int | None, limits: Limits) -> Iterator[Client]:
     import dask
     from distributed import Client, LocalCluster
+    from distributed.utils import silence_logging_cmgr
 
     with ExitStack() as stack:
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # what is wrong is told in sentences
         if scheduler == LOCAL:
             stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": limits.retries}))
             cluster = stack.enter_context(
@@ -191,7 +205,17 @@ def _client(scheduler: str, workers: int | None, limits: Limits) -> Iterator[Cli
             )
             yield stack.enter_context(Client(cluster))
         else:
-            yield stack.enter_context(_connected(scheduler, Client))
+            yield stack.enter_context(_closed(_connected(scheduler, Client)))
+
+
+@contextmanager
+def _closed(client: Client) -> Iterator[Client]:
+    """A client that is closed at the end; with a scheduler that went, as far as it can be."""
+    try:
+        yield client
+    finally:
+        with suppress(*_GOING):
+            client.close()
 
 
 def _connected(scheduler: str, connect: Any) -> Client:
