@@ -16,13 +16,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from campaigns import campaign, contents, entries, until
 from nineaudit.campaign import guard, task
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign.guard import NO_LIMITS, Limits
-from nineaudit.campaign.settings import collect
+from nineaudit.campaign.settings import collect, load
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 MIB = 2**20
@@ -50,7 +51,9 @@ def temporary(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def requests_to(folder: Path) -> Any:
     """Performs a request of a recording in a process of its own, as a worker does."""
-    name = task.prepare(lakes.open_lake("lake", create=True), collect("rig.toml"))
+    lake, document = lakes.open_lake("lake", create=True), collect("rig.toml")
+    name = task.prepare(lake, document)
+    lakes.make_newest(lake, load(document).edition)
 
     def perform(
         uri: str, limits: Limits = NO_LIMITS, function: str = "campaign_functions:harmful", home: Path = folder
@@ -142,6 +145,8 @@ def test_temporary_files_go_with_who_asked(temporary: Path, end: str | None, cod
     with subprocess.Popen([sys.executable, "-c", _ASKS, uri], stderr=subprocess.DEVNULL) as asks:
         if end is not None:
             until(lambda: any(temporary.glob("*/*/recording")) or asks.poll() is not None)
+            for child in psutil.Process(asks.pid).children() if end == "SIGTERM" else ():
+                child.terminate()  # all of a job are
             asks.send_signal(signal.Signals[end])
         assert asks.wait(timeout=60) == code
     until(lambda: not any(temporary.iterdir()), seconds=10)
