@@ -10,7 +10,8 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from nineaudit.campaign import lake as lakes
-from nineaudit.campaign.places import SIDECAR, is_local, name_of, split
+from nineaudit.campaign.naming import result_as_named
+from nineaudit.campaign.places import SIDECAR
 from nineaudit.campaign.settings import Setting
 from nineaudit.campaign.waiving import for_this
 from nineaudit.errors import ConfigurationError, RecordingError
@@ -30,7 +31,7 @@ def audited(
 ) -> tuple[dict[str, Any], Outcome]:
     """The entry of a recording that is at a path, and the outcome that it is made of."""
     outcome = _outcome(uri, path, setting)
-    result = _as_named(outcome.document(), uri, str(path.parent) if not is_local(uri) else "", setting)
+    result = result_as_named(outcome.document(), uri, path, setting)
     return _entry(uri, key_of(hashes, setting, test), setting, test, result), outcome
 
 
@@ -40,7 +41,7 @@ def failed(uri: str, setting: Setting, test: Mapping[str, str], reason: str) -> 
     from nineaudit.report import failure_document
 
     document = failure_document(PurePath(uri), RecordingError(reason, file=uri), versions())  # type: ignore[arg-type]
-    return _entry(uri, key_of([], setting, test), setting, test, _as_named(document, uri, "", setting))
+    return _entry(uri, key_of([], setting, test), setting, test, result_as_named(document, uri, None, setting))
 
 
 def _entry(uri: str, key: str, setting: Setting, test: Mapping[str, str], result: dict[str, Any]) -> dict[str, Any]:
@@ -77,23 +78,6 @@ def _outcome(uri: str, path: Path, setting: Setting) -> Outcome:
         return next(audit_each([path], setting.rig, setting.rulebook, waivers, setting.dbc))
     except ConfigurationError as error:
         return Outcome(path, error=error)
-
-
-def _as_named(document: Mapping[str, Any], uri: str, copy: str, setting: Setting) -> dict[str, Any]:
-    """The result with the uri for the path at which it was read, and sealed again; no folder of this machine."""
-    from nineaudit.files import sealed
-
-    text = json.dumps({key: value for key, value in document.items() if key != "seal"}, ensure_ascii=False)
-    for folder, name in ((copy, uri.removesuffix(split(uri)[2]).removesuffix(name_of(uri))), (str(setting.folder), "")):
-        text = text.replace(_inside(folder) + "/", _inside(name)) if folder else text
-    result: dict[str, Any] = json.loads(text)
-    result["recording"]["path"] = uri
-    return sealed(result)
-
-
-def _inside(text: str) -> str:
-    """A text as it stands within a JSON string."""
-    return json.dumps(text, ensure_ascii=False)[1:-1]
 
 
 def gate_of(result: Mapping[str, Any]) -> str | None:

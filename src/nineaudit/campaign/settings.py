@@ -11,8 +11,10 @@ import datetime as dt
 import hashlib
 import json
 import os
+import shutil
 import tempfile
 import tomllib
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -31,6 +33,17 @@ Document = Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
+class Placed:
+    """The files of a document, of each kind those that there are, in a `folder` that goes with this."""
+
+    folder: Path
+    rig: tuple[Path]
+    dbc: tuple[Path, ...]
+    rules: tuple[Path, ...]
+    waivers: tuple[Path, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Setting:
     """A `document` as it is loaded: the `rig`, the `rulebook`, the `waivers` (None: no file was given), and the CAN
     databases that take the place of the rig's (`dbc`), all in `folder`."""
@@ -41,8 +54,8 @@ class Setting:
     waivers: tuple[Waiver, ...] | None
     dbc: tuple[Path, ...]
     folder: Path
-    held: tempfile.TemporaryDirectory[str]
-    """The folder goes with the setting."""
+    held: Placed
+    """The folder goes with it."""
 
     @property
     def edition(self) -> str:
@@ -83,7 +96,8 @@ def collect(
         "ignore": ignore,
         "waivers": None if waivers is None else {"name": Path(waivers).name, **_coded(_file(waivers))},
     }
-    load(document, named)
+    kinds = {"rig": [named], "dbc": dbc, "rules": [rules], "waivers": [waivers]}
+    load(document, {kind: [os.fspath(n) for n in names if n is not None] for kind, names in kinds.items()})
     return document
 
 
@@ -95,15 +109,14 @@ def identity(document: Document) -> str:
     return _sha256(document)
 
 
-def load(document: Document, rig: str | None = None) -> Setting:
-    """The setting of a document; the same again for the same document. ConfigurationError as of the files themselves;
-    of the rig file it names `rig`."""
+def load(document: Document, given: Mapping[str, Sequence[str]] | None = None) -> Setting:
+    """The setting of a document; the same again for the same document. ConfigurationError as of the files themselves,
+    by the names that were `given` for the rig, the databases (dbc), the rules and the waivers."""
+    text = json.dumps(document, sort_keys=True)
     try:
-        return _loaded(json.dumps(document, sort_keys=True))
+        return _loaded(text)
     except ConfigurationError as error:
-        if rig is None or error.file is None or Path(error.file).name != name_of(rig):
-            raise
-        raise ConfigurationError(str(error).replace(str(error.file), rig)) from error
+        raise ConfigurationError(_as_given(str(error), _placed(text), given or {})) from error
 
 
 @lru_cache(maxsize=64)
@@ -112,22 +125,41 @@ def _loaded(text: str) -> Setting:
     from nineaudit.rig import load_rig
     from nineaudit.waivers import load_waivers
 
+    document, placed = json.loads(text), _placed(text)
+    rig = load_rig(placed.rig[0])
+    rules = next(iter(placed.rules), None)
+    book = load_book(rules, document["select"], document["ignore"])
+    waivers = [load_waivers(path, load_book(rules).codes) for path in placed.waivers]
+    return Setting(document, rig, book, waivers[0] if waivers else None, placed.dbc, placed.folder, placed)
+
+
+@lru_cache(maxsize=64)
+def _placed(text: str) -> Placed:
     document = json.loads(text)
-    held = tempfile.TemporaryDirectory(prefix="nineaudit-")
-    folder = Path(held.name)
+    folder = Path(tempfile.mkdtemp(prefix="nineaudit-"))
     home = folder / "rig" / "/".join(["in"] * _depth(document["databases"]))
     for name, file in document["databases"].items():
         if not _absolute(name):
             _put(home / name, file)
-    rig = load_rig(_put(home / document["rig"]["name"], document["rig"]))
-    dbc = tuple(_put(folder / "dbc" / str(i) / file["name"], file) for i, file in enumerate(document["dbc"]))
     for name, file in (document["rules"] or {}).items():
         _put(folder / "rules" / name, file)
-    rules = folder / "rules" if document["rules"] is not None else None
-    book = load_book(rules, document["select"], document["ignore"])
-    given = document["waivers"]
-    waivers = None if given is None else load_waivers(_put(folder / given["name"], given), load_book(rules).codes)
-    return Setting(document, rig, book, waivers, dbc, folder, held)
+    placed = Placed(
+        folder,
+        rig=(_put(home / document["rig"]["name"], document["rig"]),),
+        dbc=tuple(_put(folder / "dbc" / str(i) / file["name"], file) for i, file in enumerate(document["dbc"])),
+        rules=() if document["rules"] is None else (folder / "rules",),
+        waivers=tuple(_put(folder / "waivers" / one["name"], one) for one in (document["waivers"],) if one is not None),
+    )
+    weakref.finalize(placed, shutil.rmtree, folder, ignore_errors=True)
+    return placed
+
+
+def _as_given(said: str, placed: Placed, given: Mapping[str, Sequence[str]]) -> str:
+    """A sentence with the names that were given for files of the folder."""
+    for kind, names in given.items():
+        for path, name in zip(getattr(placed, kind), names, strict=True):
+            said = said.replace(str(path), name)
+    return said.replace(f"{placed.folder}{os.sep}", "")
 
 
 def _databases(data: bytes) -> list[str]:
@@ -142,7 +174,7 @@ def _databases(data: bytes) -> list[str]:
 
 def _sheets(folder: Path) -> dict[str, Any]:
     """The rule sheets of a folder."""
-    return {path.name: _coded(path.read_bytes()) for path in sorted(folder.glob("*.toml"))}
+    return {path.name: _coded(_file(path)) for path in sorted(folder.glob("*.toml"))}
 
 
 def _file(path: str | os.PathLike[str]) -> bytes:

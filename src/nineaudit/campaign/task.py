@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from nineaudit.campaign import lake as lakes
 from nineaudit.campaign.making import audited, failed, gate_of, hashes_of, key_of
+from nineaudit.campaign.naming import report_as_named
 from nineaudit.campaign.places import fetched, recording_files, signature
 from nineaudit.campaign.settings import Document, Setting, collect, identity, load, rig_bytes
 from nineaudit.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from nineaudit.campaign.lake import Lake
-    from nineaudit.checking import Outcome
 
 Summary = dict[str, Any]
 REPORTS: Final = ("failed", "all", "none")
@@ -180,10 +180,13 @@ def _pointer(entry: Mapping[str, Any], gate: str | None) -> dict[str, Any]:
 def _written(
     lake: Lake, uri: str, path: Path, hashes: list[str], setting: Setting, test: dict[str, str], reports: str
 ) -> Summary:
+    from nineaudit.report import render
+
     entry, outcome = audited(uri, path, hashes, setting, test)
     gate = gate_of(entry["result"])
     if outcome.audit is not None and _asked(reports, gate):
-        _write_report(lake, outcome, entry)
+        page = report_as_named(render(outcome.audit), uri, path, setting)
+        lakes.write_text(lake, lakes.report_name(uri, entry["key"]), page)
     return _put(lake, entry, gate)
 
 
@@ -204,13 +207,6 @@ def _summary(uri: str, edition: str, pointer: Mapping[str, Any], *, kept: bool) 
         "transient": bool(pointer.get("transient")),
         **({"reason": pointer["reason"]} if "reason" in pointer else {}),
     }
-
-
-def _write_report(lake: Lake, outcome: Outcome, entry: Mapping[str, Any]) -> None:
-    from nineaudit.report import render
-
-    assert outcome.audit is not None
-    lakes.write_text(lake, lakes.report_name(entry["uri"], entry["key"]), render(outcome.audit))
 
 
 def _stat_name(uri: str) -> str:
