@@ -45,6 +45,10 @@ EVEN: Final = 6
 """Digits of |Z| to which changes are equal, as a tilt of a sensor that never moved and its seat's: the first counts."""
 
 
+ALIKE: Final = 1.3
+"""Ratio of two scatters, each estimated by 30 recordings, within which they may be the same (2 standard deviations)."""
+
+
 def threshold() -> float:
     """|Z| above which a change is significant: Bonferroni over all shapes of all unknowns of a sensor, two-sided."""
     return NormalDist().inv_cdf(1.0 - FALSE_ALARM / (2.0 * PER_SENSOR * SHAPES))
@@ -74,13 +78,13 @@ def scan(seen: Look, size: int, margin: float = np.inf) -> list[Found]:
     residuals = [solution.residual(one) for one in solution.marginals]
     ranked = [one for sight in seen.sights for one in _best(sight, residuals)]
     ranked.sort(key=lambda one: (-round(abs(float(one.z[one.top])), EVEN), one.unknown))
-    return [_found(one, size) for one in ranked if ranked[0].z[ranked[0].top] ** 2 - one.z[one.top] ** 2 < margin]
+    return [_found(one, size) for one in ranked if _less(ranked[0], one) < margin]
 
 
 @dataclass(frozen=True, eq=False)
 class Best:
     """The largest |Z| of an unknown: the `place` of it in the crowd of `sight`, the shape `top` of all `z` (S,), its
-    `size`, and `each` (J,) recording's own."""
+    `size`, `each` (J,) recording's own, and what Z was divided by for their scatter (`wider`)."""
 
     unknown: int
     sight: Sight
@@ -89,6 +93,15 @@ class Best:
     z: FloatArray
     size: float
     each: FloatArray
+    wider: float
+
+
+def _less(best: Best, one: Best) -> float:
+    """By how much Z² of `one` is less. Of what explains the same, one has the recordings of a seat, another those of
+    one stay there: their scatter is estimated by each, and where it is ALIKE, that of the best is taken for both."""
+    alike = best.wider / ALIKE < one.wider < best.wider * ALIKE
+    z = float(one.z[one.top]) * (one.wider / best.wider if alike else 1.0)
+    return float(best.z[best.top]) ** 2 - z**2
 
 
 def _best(sight: Sight, residuals: list[FloatArray]) -> list[Best]:
@@ -106,8 +119,9 @@ def _best(sight: Sight, residuals: list[FloatArray]) -> list[Best]:
     z = np.where(seen, score / np.sqrt(info), 0.0) / wider[:, None]
     tops = np.argmax(np.round(np.abs(z), EVEN), axis=1)
     return [
-        Best(int(crowd.unknowns[i]), sight, i, int(tops[i]), z[i], float(score[i, tops[i]] / info[i, tops[i]]), each[i])
-        for i in np.flatnonzero(seen.any(axis=1)).tolist()
+        Best(int(crowd.unknowns[i]), sight, i, k, z[i], float(score[i, k] / info[i, k]), each[i], float(wider[i]))
+        for i, k in enumerate(tops.tolist())
+        if seen[i].any()
     ]
 
 
