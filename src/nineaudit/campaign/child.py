@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -26,6 +27,7 @@ _REMOVE: Final = "import shutil, sys; shutil.rmtree(sys.argv[1], ignore_errors=T
 
 def main(function: str, folder: str) -> None:
     """Answer requests with a function, until there are none."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # where all of a job are told to end, who asks does, and this with it
     answers = os.fdopen(os.dup(_OUTPUT), "w", encoding="utf-8")
     os.dup2(_ERRORS, _OUTPUT)
     requests: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
