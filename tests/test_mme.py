@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import random
+import sys
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -127,6 +129,16 @@ def test_a_fingerprint_is_of_all_the_files(tmp_path: Path) -> None:
     changed = path / "Channel" / "T1.002"
     changed.write_text(changed.read_text().replace("-1.1", "-1.2"))
     assert mme_files.fingerprint(path)[1] != sha256
+
+
+@pytest.mark.skipif(os.name == "nt" or sys.platform == "darwin", reason="names there are Unicode")
+def test_a_channel_file_may_have_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
+    path = folder(tmp_path, files())
+    before = mme_files.fingerprint(path)[1]
+    channel = next(path.rglob("*.001"))
+    channel.rename(os.fsdecode(os.fsencode(channel.parent) + b"/T\xfc.001"))
+    assert mme_files.fingerprint(path)[1] != before
+
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def fingerprint(path: Path) -> tuple[int, str]:
         with (folder / name).open("rb") as file:
             content = hashlib.file_digest(file, "sha256").hexdigest()
             total += file.tell()
-        digest.update(f"{name}\0{content}\n".encode())
+        digest.update(f"{name}\0{content}\n".encode(errors="surrogateescape"))
     return total, digest.hexdigest()
 
 
