@@ -141,6 +141,18 @@ def test_two_steps_are_two_changes_not_one_that_is_too_large() -> None:
         assert abs(one.value - 0.04) < one.U < 0.003
 
 
+@pytest.mark.parametrize(("seed", "bad"), [(2, 196), (6, 3), (10, 199)])
+def test_one_bad_test_of_a_sensor_that_drifts_is_left_out_and_makes_no_more_changes(seed: int, bad: int) -> None:
+    """10 % in its first or last test: one ramp for both and a second change to make up for it."""
+    culprit = {196: "S03", 3: "S33", 199: "S33"}[bad]
+    found = assess_records(drawn(Plan(), seed, drift=4.0, culprit=culprit, outlier=bad).records)
+    (member,) = accused(found)
+    (one,) = member.deviations
+    assert (member.name, one.shape) == (culprit, "step")
+    assert abs(one.value - 0.02) < one.U < 0.006
+    assert any(f"T{bad:04d}" in note for note in found.notes)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_neighbour_that_was_taken_first_is_cleared_when_the_two_that_drift_are_known(seed: int) -> None:
     """a0 and a1 drift by 3 %; a2 of the same triad had been first, and stayed with +0.2 % ± 0.5 %."""

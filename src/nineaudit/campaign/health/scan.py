@@ -170,10 +170,11 @@ def _trimmed(part: float) -> float:
 
 
 def outlying(found: Found) -> IntArray:
-    """Recordings without which a change is not significant, and that are unlike those about them: bad tests."""
-    track = found.track
+    """Bad tests: recordings unlike those about them without which a change is not significant; if it is, those of which
+    one alone says more than the change."""
+    track, wider = found.track, excess(found.track)
     near = np.array([np.median(track.z[max(i - 3, 0) : i + 4]) for i in range(len(track.z))])
-    odd = np.abs(track.z - near) > 5.0 * excess(track)
+    odd = np.abs(track.z - near) > 5.0 * wider
     if not odd.any():
         return np.zeros(0, dtype=np.intp)
     shape = found.amount[track.index]
@@ -181,7 +182,9 @@ def outlying(found: Found) -> IntArray:
     kept = ~odd
     left = centred[kept] @ (track.z * np.sqrt(track.weight))[kept]
     power = float(np.sqrt((centred[kept] ** 2) @ track.weight[kept]))
-    return track.index[odd] if abs(left) < threshold() * power else np.zeros(0, dtype=np.intp)
+    significant = abs(left) >= threshold() * power
+    bad = odd & (np.abs(track.z) > abs(found.z) * wider) if significant else odd
+    return np.asarray(track.index[bad])
 
 
 def change(found: Found) -> Change:

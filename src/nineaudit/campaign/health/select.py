@@ -3,12 +3,13 @@
 A sensor that drifts pulls the estimates of its neighbours with it; once its change is in the model, they are cleared. A
 sensor may change more than once. What was taken first may be wrong by what is taken later (the third of a triad of
 which two drift; one step for one up and one down), so when nothing more is significant, each change is looked for again
-about the others: where another explains more, or none is significant, it goes, and the selection goes on without it. As
-Z² is what a change gains in 2 ln L, each of these steps makes
+about the others: where another explains more, or it is not significant, or made by bad tests, it goes, and the
+selection goes on. As Z² is what a change gains in 2 ln L, each of these steps makes
 
     2 ln L − threshold² · (number of changes)
 
-larger, and the selection ends; ROUNDS is for the rest (the excess of scatter, which is estimated anew each time).
+larger, or leaves tests out, and the selection ends; ROUNDS is for the rest (the excess of scatter is estimated anew
+each time).
 
 Changes that explain nearly as much about the final others, their odds within 1 : 100 of the best, are rivals: none of
 them is accused alone.
@@ -81,7 +82,7 @@ def _selected(
     seen = look(solve(part, scatter, _shapes(changes)))
     for _ in range(ROUNDS):
         part, seen = _grown(part, seen, changes, out, scatter, size)
-        again = _reviewed(seen, changes, size)
+        again = _reviewed(seen, changes, out, size)
         if again is None:
             break
         seen = again
@@ -97,9 +98,8 @@ def _grown(
         if not ranked or abs(ranked[0].z) < threshold() or len(changes) >= MOST_CHANGES:
             return part, seen
         best = ranked[0]
-        bad = outlying(best) if len(out) < MOST_OUTLYING else ()
-        if len(bad):
-            out.extend(int(b) for b in bad)
+        if bad := _bad(best, out):
+            out.extend(bad)
             part = part.take(_indices(part) - set(out))
             seen = look(solve(part, scatter, _shapes(changes)))
         else:
@@ -107,23 +107,30 @@ def _grown(
             seen = look_again(seen, change(best))
 
 
-def _reviewed(seen: Look, changes: list[Selected], size: int) -> Look | None:
+def _reviewed(seen: Look, changes: list[Selected], out: Sequence[int], size: int) -> Look | None:
     """Each change with its rivals about the others, the weakest first; where one is not what it was taken for, the look
     without it."""
     n = len(seen.solution.part.unknowns)
     sure = np.abs(seen.solution.x[n:]) / np.sqrt(np.diag(seen.solution.cov)[n:])
     for k in np.argsort(sure, kind="stable").tolist():
         rest = look_without(seen, k)
-        ranked, mine = scan(rest, size, MARGIN), changes[k].found
-        if not ranked or abs(ranked[0].z) < threshold() or not _same(ranked[0], mine):
+        ranked = scan(rest, size, MARGIN)
+        if not ranked or not _stands(ranked[0], changes[k].found, out):
             del changes[k]
             return rest
         changes[k] = Selected(ranked[0], tuple(ranked[1:]))
     return None
 
 
-def _same(one: Found, other: Found) -> bool:
-    return one.unknown == other.unknown and np.array_equal(one.amount, other.amount)
+def _stands(best: Found, taken: Found, out: Sequence[int]) -> bool:
+    """Whether the best change about the others is the one that was taken, significant, and not of bad tests."""
+    same = best.unknown == taken.unknown and np.array_equal(best.amount, taken.amount)
+    return same and abs(best.z) >= threshold() and not _bad(best, out)
+
+
+def _bad(best: Found, out: Sequence[int]) -> list[int]:
+    """Recordings to be left out before a change is taken."""
+    return [int(i) for i in outlying(best)] if len(out) < MOST_OUTLYING else []
 
 
 def _named(changes: Sequence[Selected]) -> list[tuple[int, str, int]]:
