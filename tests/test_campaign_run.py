@@ -15,7 +15,7 @@ from types import SimpleNamespace
 import pytest
 
 from campaigns import campaign, contents, entries, noted, plan, told, until
-from nineaudit.campaign import running
+from nineaudit.campaign import clusters, running
 from nineaudit.campaign.guard import Limits
 from nineaudit.campaign.requests import Request
 from nineaudit.campaign.running import SchedulerLost
@@ -196,6 +196,9 @@ def test_a_changed_rig_costs_its_own_recordings() -> None:
     [
         ({"shard": "3/2"}, "--shard: no such part; found '3/2'"),
         ({"scheduler": "nowhere.json"}, "--scheduler: no such scheduler; found 'nowhere.json'"),
+        ({"scheduler": "half.json"}, "--scheduler: no such scheduler; found 'half.json'"),
+        ({"scheduler": "other.json"}, "--scheduler: no such scheduler; found 'other.json'"),
+        ({"scheduler": "port.json"}, "--scheduler: no scheduler answers: missing port number in address '8786'"),
         ({"rig": "none.toml"}, "none.toml: cannot read the rig file"),
         ({"rig": None}, "tests/T1.csv: no rig file; name one with --rig, or in the table"),
         ({"lake": "memory://lake"}, "--lake: only this process would see it"),
@@ -204,6 +207,9 @@ def test_a_changed_rig_costs_its_own_recordings() -> None:
 )
 def test_a_plan_that_is_wrong_is_a_sentence(change: dict[str, str], said: str) -> None:
     campaign(Path(), ["T1.csv"])
+    Path("half.json").write_text('{"address": "tcp:', encoding="utf-8")
+    Path("other.json").write_text('["tcp://10.0.0.5:8786"]', encoding="utf-8")
+    Path("port.json").write_text('{"address": 8786}', encoding="utf-8")
     with pytest.raises(ConfigurationError) as error:
         told(replace(plan(Path()), **change))  # type: ignore[arg-type]
     assert str(error.value).removeprefix(f"{Path.cwd()}/").startswith(said)
@@ -223,7 +229,7 @@ def test_a_stream_that_closes_is_a_lost_scheduler_where_it_does_not_answer(
         raise TimeoutError("nobody to say it to")
 
     client = SimpleNamespace(status="running", sync=asked, scheduler=SimpleNamespace(identity=None), close=close)
-    monkeypatch.setattr(running, "_connected", lambda *_: client)
+    monkeypatch.setattr(clusters, "_connected", lambda *_: client)
     monkeypatch.setattr(running, "_windowed", lambda *_: _closes())
     with pytest.raises(raised):
         list(running.run([], "tcp://10.0.0.5:8786"))

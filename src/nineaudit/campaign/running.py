@@ -5,19 +5,15 @@ So that this process holds no results, and nothing that was finished is lost wit
 
 from __future__ import annotations
 
-import logging
-import signal
 import socket
 import time
 import uuid
 from collections.abc import Iterable, Iterator
-from concurrent.futures import CancelledError
-from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import version
 from itertools import islice
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
+from nineaudit.campaign import clusters
 from nineaudit.campaign.guard import FUNCTION, NO_LIMITS, Limits, guarded
 from nineaudit.campaign.requests import Request, give_up
 from nineaudit.errors import ConfigurationError, NineauditError
@@ -27,19 +23,13 @@ if TYPE_CHECKING:
 
     from nineaudit.campaign.task import Summary
 
-LOCAL: Final = "local"
+LOCAL: Final = clusters.LOCAL
 Suspect = tuple[Request, int]
 """A request whose workers died, and how many of them."""
 _AHEAD: Final = 2
 """Tasks in flight for each thread of the workers: the next one is there when one ends."""
 _COUNTED: Final = 2.0
 """Seconds after which the workers are counted again: a cluster may grow."""
-_ASKED: Final = 0.5
-"""Seconds after which a scheduler is asked again whether it is there."""
-_PATIENCE: Final = 30.0
-"""Seconds in which a scheduler has to answer."""
-_GOING: Final = (OSError, RuntimeError, LookupError, AttributeError, CancelledError)
-"""What Dask raises when a scheduler goes: which depends on what was under way."""
 
 
 class SchedulerLost(NineauditError):
@@ -63,7 +53,7 @@ def run(
     """
     wrong: list[NineauditError] = []
     suspects: list[Suspect] = []
-    with _client(scheduler, workers, limits) as client:
+    with clusters.client(scheduler, workers, limits.retries) as client:
         try:
             yield from _windowed(client, scheduler, _until_wrong(requests, wrong), limits, function, suspects)
             for request, _ in suspects:  # one at a time: who dies now dies by its own recording
@@ -72,8 +62,8 @@ def run(
                 for one, deaths in again:
                     reason = f"every worker that audited it died ({deaths} of them, then as many again)"
                     yield {**give_up(one, reason), "attempts": 2 * deaths}
-        except _GOING as error:
-            if _gone(client):
+        except clusters.GOING as error:
+            if clusters.gone(client):
                 raise _lost(scheduler) from error
             raise
     if wrong:
@@ -146,20 +136,6 @@ def _windowed(
         done.update(_submit(client, requests, count - len(pending), limits, function, pending))
 
 
-def _gone(client: Client) -> bool:
-    """Whether the scheduler went away: it is asked, for what the client says of itself lags behind what it meets."""
-    end = time.monotonic() + _PATIENCE
-    while client.status == "running" and time.monotonic() < end:
-        try:
-            client.sync(client.scheduler.identity, callback_timeout=_ASKED)  # type: ignore[union-attr]
-        except TimeoutError:
-            continue
-        except _GOING:
-            return True
-        return client.status != "running"
-    return True
-
-
 def _submit(
     client: Client,
     requests: Iterator[Request],
@@ -180,61 +156,6 @@ def _submit(
 def _window(client: Client) -> int:
     """How many tasks are in flight."""
     return _AHEAD * max(int(sum(client.nthreads().values())), 1)
-
-
-@contextmanager
-def _client(scheduler: str, workers: int | None, limits: Limits) -> Iterator[Client]:
-    import dask
-    from distributed import Client, LocalCluster
-    from distributed.utils import silence_logging_cmgr
-
-    with ExitStack() as stack:
-        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # what is wrong is told in sentences
-        if scheduler == LOCAL:
-            stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": limits.retries}))
-            cluster = stack.enter_context(
-                LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    memory_limit=0,  # audits are in processes of their own: see guard.py
-                    dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.CRITICAL,
-                    preload=[__name__],  # dask_setup
-                )
-            )
-            yield stack.enter_context(Client(cluster))
-        else:
-            yield stack.enter_context(_closed(_connected(scheduler, Client)))
-
-
-@contextmanager
-def _closed(client: Client) -> Iterator[Client]:
-    """A client that is closed at the end; with a scheduler that went, as far as it can be."""
-    try:
-        yield client
-    finally:
-        with suppress(*_GOING):
-            client.close()
-
-
-def _connected(scheduler: str, connect: Any) -> Client:
-    named: dict[str, Any] = {"address": scheduler}
-    if "://" not in scheduler:
-        if not Path(scheduler).is_file():
-            expected = "local, an address such as tcp://10.0.0.5:8786, or a scheduler file that is there"
-            raise ConfigurationError("no such scheduler", place="--scheduler", found=scheduler, expected=expected)
-        named = {"scheduler_file": scheduler}
-    try:
-        client: Client = connect(**named, timeout=_PATIENCE)
-    except (OSError, ValueError) as error:
-        raise ConfigurationError(f"no scheduler answers: {error}", place="--scheduler", found=scheduler) from error
-    return client
-
-
-def dask_setup(worker: object) -> None:  # noqa: ARG001
-    """On a local worker, when it starts: Ctrl-C is for the command, which ends its workers."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _lost(scheduler: str) -> SchedulerLost:
