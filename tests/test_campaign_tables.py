@@ -367,7 +367,7 @@ def test_values_of_every_kind_are_text(made: lakes.Lake, capsys: pytest.CaptureF
     assert json.loads(shown) == [
         {
             "none": None, "nan": None, "day": "2026-01-02", "list": [1, 2], "yes": True,
-            "map": {"a": 1.5}, "struct": {"x": [1]}, "exact": "1.25",
+            "map": {"a": 1.5}, "struct": {"x": [1]}, "exact": 1.25,
             "hostile": "a\x1b[2J",
         }
     ]  # fmt: skip
