@@ -1,7 +1,8 @@
 """Campaigns drawn from the model itself, without recordings: what thousands of them say of false alarms.
 
-Sensors with a gain (and two tilts where wanted) each, in the seats of a few rigs. A test tells the errors of its rig's
-channels by a likelihood in which a scale that all gains share is not seen.
+Sensors with a gain (and two tilts where wanted) each, in the seats of a few rigs. A tilt is fixed in the sensor's case,
+which is rolled about its axis by some quarter turns in each seat. A test tells the errors of its rig's channels by a
+likelihood in which a scale that all gains share is not seen.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from nineaudit.array import FloatArray
 from nineaudit.campaign.health.records import Record, Records, Row, family
 
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+TILTS = ("tilt_1", "tilt_2")
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,8 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A campaign and its truth: what lasts, by (parameter, sensor or seat), in records.UNIT."""
+    """A campaign and its truth: what lasts, by (parameter, owner), in records.UNIT. Owners: the sensor of a gain, the
+    seat, and the sensor in a seat (sensor, *seat) of a tilt."""
 
     records: Records
     truth: dict[tuple[str, object], float]
@@ -47,11 +49,13 @@ def drawn(
     outlier: int | None = None,
     what: str = "gain",
     ramp: bool = False,
+    since: float = 0.5,
 ) -> Drawn:
-    """A campaign in which an error of one sensor is larger by `drift` (in UNIT) from its middle on, or by and by."""
+    """A campaign in which an error of one sensor is larger by `drift` (in UNIT) from `since` of its tests on (in parts
+    of all), or by and by from there; a tilt in the direction that `what` is of in a case that is not rolled."""
     rng = np.random.default_rng([seed, 7])
     truth: dict[tuple[str, object], float] = {}
-    records = [_test(i, plan, rng, truth, drift, culprit, what, outlier, ramp) for i in range(plan.tests)]
+    records = [_test(i, plan, rng, truth, drift, culprit, what, outlier, ramp, since) for i in range(plan.tests)]
     names = frozenset(r.sensor for record in records for r in record.rows)
     return Drawn(Records(records, True, [], names), truth)
 
@@ -71,12 +75,14 @@ def _test(
     what: str,
     outlier: int | None,
     ramp: bool,
+    since: float,
 ) -> Record:
     rig = number % plan.rigs
     rows = tuple(row for c in range(plan.channels) for row in _rows(plan, rig, c, number))
     theta = np.array([_lasting(row, truth, rng) for row in rows]) + plan.scatter * rng.standard_normal(len(rows))
-    along = max(2.0 * number / plan.tests - 1.0, 0.0) if ramp else float(2 * number >= plan.tests)
-    mine = np.array([row.sensor == culprit and row.parameter == what for row in rows])
+    left = (number / plan.tests - since) / (1.0 - since)
+    along = max(left, 0.0) if ramp else float(left >= 0.0)
+    mine = np.array([_felt(row, what, truth) if row.sensor == culprit else 0.0 for row in rows])
     theta = theta + drift * along * mine
     if number == outlier:
         theta = theta + 20.0 * mine
@@ -99,17 +105,42 @@ def _test(
 def _rows(plan: Plan, rig: int, channel: int, number: int) -> list[Row]:
     sensor, seat = sensor_in(plan, rig, channel, number), (f"rig {rig}", f"a{channel}")
     gain = Row(sensor, seat, "accelerometer", "gain", 1.0)
-    axis = AXES[0]  # sensors that move keep their direction
-    tilts = [Row(sensor, seat, "accelerometer", name, 1.0, axis) for name in ("tilt_1", "tilt_2")]
+    tilts = [Row(sensor, seat, "accelerometer", name, 1.0) for name in TILTS]
     return [gain, *(tilts if plan.tilts else [])]
 
 
 def _lasting(row: Row, truth: dict[tuple[str, object], float], rng: np.random.Generator) -> float:
-    owners: list[object] = [row.sensor] if family(row.parameter) == "gain" else [row.sensor, row.seat]
-    for owner in owners:
-        if (row.parameter, owner) not in truth:
-            truth[row.parameter, owner] = float(rng.standard_normal() / np.sqrt(len(owners)))
-    return sum(truth[row.parameter, owner] for owner in owners)
+    if family(row.parameter) == "gain":
+        return _drawn(row.parameter, row.sensor, truth, rng, 1.0)
+    seat = _drawn(row.parameter, row.seat, truth, rng, 0.5)
+    stay = (row.sensor, *row.seat)
+    if (row.parameter, stay) not in truth:
+        case = [_drawn(name, row.sensor, truth, rng, 0.5) for name in TILTS]
+        turns = truth.setdefault(("roll", stay), float(rng.integers(4)))
+        truth[row.parameter, stay] = float(_rolled(turns)[TILTS.index(row.parameter)] @ case)
+    return seat + truth[row.parameter, stay]
+
+
+def _drawn(
+    name: str, owner: object, truth: dict[tuple[str, object], float], rng: np.random.Generator, variance: float
+) -> float:
+    if (name, owner) not in truth:
+        truth[name, owner] = float(np.sqrt(variance) * rng.standard_normal())
+    return truth[name, owner]
+
+
+def _rolled(turns: float) -> FloatArray:
+    """(2,2) of quarter turns."""
+    cos, sin = np.cos(0.5 * np.pi * turns), np.sin(0.5 * np.pi * turns)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
+def _felt(row: Row, what: str, truth: dict[tuple[str, object], float]) -> float:
+    """How much of an error `what` of a sensor a row has, as it is rolled."""
+    if what not in TILTS or row.parameter not in TILTS:
+        return float(row.parameter == what)
+    turns = truth["roll", (row.sensor, *row.seat)]
+    return float(_rolled(turns)[TILTS.index(row.parameter), TILTS.index(what)])
 
 
 def _told(rows: tuple[Row, ...], plan: Plan, rng: np.random.Generator) -> FloatArray:

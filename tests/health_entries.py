@@ -27,6 +27,8 @@ def entry(
     parameters: Sequence[str] = ("gain",),
     tell: float = 20.0,
     scale: Sequence[float] = (1.0,) * 6,
+    positions: Sequence[Sequence[float]] = POSITIONS,
+    axes: Sequence[Sequence[float]] = AXES,
     **changes: Any,
 ) -> Entry:
     """Test `number`, a day later than the one before, with errors `theta` (SI) by channel number and parameter, told to
@@ -43,7 +45,8 @@ def entry(
         "eta": _text(eta),
         "matrix": _text(matrix[np.triu_indices(len(names))]),
     }
-    channels = [_channel(c, serials[c], kinds[c], scale[c]) for c in range(6)]
+    stated = [{"scale": scale[c], "position": list(positions[c]), "axis": list(axes[c])} for c in range(6)]
+    channels = [_channel(c, serials[c], kinds[c]) | stated[c] for c in range(6)]
     uri = changes.get("uri", f"T{number:03d}.csv")
     day = (date(2026, 1, 1) + timedelta(number)).isoformat()
     result = {
@@ -54,6 +57,5 @@ def entry(
     return {"uri": uri, "test": {"date": day} | changes.get("test", {}), "result": result}
 
 
-def _channel(number: int, serial: str | None, kind: str, scale: float) -> dict[str, Any]:
-    stated = {"scale": scale, "position": list(POSITIONS[number]), "axis": list(AXES[number])}
-    return {"channel": f"a{number}", "serial": serial, "kind": kind, "shock": 1000.0 + 100.0 * number} | stated
+def _channel(number: int, serial: str | None, kind: str) -> dict[str, Any]:
+    return {"channel": f"a{number}", "serial": serial, "kind": kind, "shock": 1000.0 + 100.0 * number}

@@ -10,12 +10,15 @@ from typing import Any, Final
 import numpy as np
 
 from nineaudit.array import FloatArray
+from nineaudit.campaign.health.anchors import Seat
 from nineaudit.campaign.health.connect import parts
 from nineaudit.campaign.health.crowd import LEAST_RECORDINGS, Track, tracks
-from nineaudit.campaign.health.deviations import Deviation, Key, deviations, key_of, seat_name
+from nineaudit.campaign.health.deviations import Deviation, Key, deviations, key_of, levels, seat_name
 from nineaudit.campaign.health.model import Solution
-from nineaudit.campaign.health.records import UNIT, Records, Seat, family, read_records
+from nineaudit.campaign.health.records import UNIT, Records, family, read_records
+from nineaudit.campaign.health.scan import excess
 from nineaudit.campaign.health.select import Selection, select
+from nineaudit.campaign.health.standing import Standing, standing
 from nineaudit.finding import COVERAGE_FACTOR
 
 TOLERANCE: Final = 0.01
@@ -124,15 +127,18 @@ def _members(number: int, chosen: Selection, known: Records, tolerance: float) -
     part, solution = chosen.parts[number], chosen.solutions[number]
     sat, used = _who(solution)
     all_tracks = {t.unknown: t for t in tracks(solution)}
-    changes = deviations(chosen.changes[number], solution, known.records, tolerance)
-    apart = _apart(solution, sat)
+    stands = standing(solution, known.records)
+    changes = deviations(chosen.changes[number], stands, tolerance)
+    off = levels(changes, stands, {i: excess(t) for i, t in all_tracks.items()}, tolerance)
+    apart = _apart(solution)
     out = []
     owned: dict[tuple[bool, str], list[int]] = {}
     for i, unknown in enumerate(part.unknowns):
         owned.setdefault(key_of(unknown), []).append(i)
     for (is_seat, name), mine in owned.items():
         tests = sorted(used[is_seat, name])
-        changed = tuple(changes.get((is_seat, name), ()))
+        changed = (*changes.get((is_seat, name), ()), *off.get((is_seat, name), ()))
+        mine.sort(key=lambda i: stands.last.get(i, (-1, 0)), reverse=True)
         gain = next((i for i in mine if part.unknowns[i].parameter == "gain"), None)
         out.append(
             Member(
@@ -143,7 +149,7 @@ def _members(number: int, chosen: Selection, known: Records, tolerance: float) -
                 tests=len(tests),
                 first=known.records[tests[0]].label if tests else "",
                 last=known.records[tests[-1]].label if tests else "",
-                level=_levels(mine, solution),
+                level=_levels(mine, stands),
                 deviations=changed,
                 state=_state(changed, is_seat, len(tests)),
                 apart=apart.get((is_seat, name), True),
@@ -170,23 +176,23 @@ def _who(solution: Solution) -> tuple[dict[Key, set[Seat]], dict[Key, set[int]]]
     return sat, used
 
 
-def _levels(mine: Sequence[int], solution: Solution) -> dict[str, tuple[float, float]]:
-    """By parameter (of tilts in several axes, the first): as it is after the last change."""
+def _levels(mine: Sequence[int], stands: Standing) -> dict[str, tuple[float, float]]:
+    """By parameter, of the seat or setting that it had last (`mine` begins with those): as it is now, gains and
+    positions against the rig file in force."""
     out: dict[str, tuple[float, float]] = {}
-    n = len(solution.part.unknowns)
     for i in mine:
-        parameter = solution.part.unknowns[i].parameter
-        its = {n + k: float(c.amount.max()) for k, c in enumerate(solution.changes) if c.unknown == i}
-        at, by = [i, *its], np.array([1.0, *its.values()])
-        unit, spread = UNIT[family(parameter)], float(np.sqrt(by @ solution.cov[np.ix_(at, at)] @ by))
-        out.setdefault(parameter, (unit * float(by @ solution.x[at]), COVERAGE_FACTOR * unit * spread))
+        parameter = stands.solution.part.unknowns[i].parameter
+        unit, (value, u) = UNIT[family(parameter)], stands.value(i)
+        right = 0.0 if family(parameter) == "tilt" or i not in stands.last else stands.moved(i)
+        out.setdefault(parameter, (unit * (value - right), COVERAGE_FACTOR * unit * u))
     return out
 
 
 def _state(changed: Sequence[Deviation], is_seat: bool, tests: int) -> State:
-    if not changed:
+    open_ = [d for d in changed if not d.restated]
+    if not open_:
         return State.IN_CONTROL if tests >= LEAST_RECORDINGS else State.TOO_FEW
-    beyond = [d for d in changed if d.beyond]
+    beyond = [d for d in open_ if d.beyond]
     if not beyond:
         return State.WATCH
     if all(d.rivals for d in beyond):
@@ -194,8 +200,9 @@ def _state(changed: Sequence[Deviation], is_seat: bool, tests: int) -> State:
     return State.INSPECT if is_seat else State.RECALIBRATE
 
 
-def _apart(solution: Solution, sat: Mapping[Key, set[Seat]]) -> dict[Key, bool]:
-    """Whether the tilts of a sensor and of all its seats are told apart: by the posterior of their difference."""
+def _apart(solution: Solution) -> dict[Key, bool]:
+    """Whether the tilts of a sensor and of all its seats are told apart, by the posterior of their difference: only
+    where others sat in the seat too."""
     unknowns = solution.part.unknowns
     prior, cov = solution.part.prior, solution.cov
     seat = {(u.parameter, u.seat): i for i, u in enumerate(unknowns) if u.seat}
@@ -203,12 +210,11 @@ def _apart(solution: Solution, sat: Mapping[Key, set[Seat]]) -> dict[Key, bool]:
     for i, unknown in enumerate(unknowns):
         if unknown.sensor is None or family(unknown.parameter) != "tilt":
             continue
-        for place in sat[False, unknown.sensor]:
-            j = seat.get((unknown.parameter, place))
-            left = 0.0 if j is None else (cov[i, i] + cov[j, j] - 2.0 * cov[i, j]) / (prior[i] ** 2 + prior[j] ** 2)
-            joined = left > TOGETHER
-            for key in ((False, unknown.sensor), (True, seat_name(place))):
-                out[key] = out.get(key, True) and not joined
+        place = (str(unknown.within[0]), str(unknown.within[1]))
+        j = seat[unknown.parameter, place]
+        left = float((cov[i, i] + cov[j, j] - 2.0 * cov[i, j]) / (prior[i] ** 2 + prior[j] ** 2))
+        for key in ((False, unknown.sensor), (True, seat_name(place))):
+            out[key] = out.get(key, True) and left <= TOGETHER
     return out
 
 

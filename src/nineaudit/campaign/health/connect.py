@@ -20,7 +20,7 @@ def parts(records: Sequence[Record]) -> list[Part]:
     for i, record in enumerate(records):
         if not record.rows:
             continue  # its rig leaves no error open
-        key = tuple((r.sensor, r.seat, r.kind, r.parameter, r.axis) for r in record.rows)
+        key = tuple((r.sensor, r.seat, r.kind, r.parameter, r.setting) for r in record.rows)
         keys.setdefault(key, []).append(i)
     for members in keys.values():
         by_rows[records[members[0]].rows] = members
@@ -28,6 +28,8 @@ def parts(records: Sequence[Record]) -> list[Part]:
     prior: list[float] = []
     touched = [_touched(rows, number, prior) for rows in by_rows]
     edges = [(t[0][0], a) for t in touched for pair in t for a in pair]
+    own: dict[str | None, int] = {}  # what a sensor has in one seat or setting and in another
+    edges += [(own.setdefault(one.sensor, i), i) for one, i in number.items() if one.sensor is not None]
     first, second = np.array(edges, dtype=np.intp).reshape(-1, 2).T
     graph = coo_array((np.ones(len(edges)), (first, second)), shape=(len(number),) * 2)
     count, label = connected_components(graph, directed=False)
@@ -49,9 +51,10 @@ def _touched(rows: tuple[Row, ...], number: dict[Unknown, int], prior: list[floa
     """The unknowns of each row; new ones are numbered."""
     out = []
     for row in rows:
-        of = {"gain": (True, False), "tilt": (True, True), "position": (False, True)}[family(row.parameter)]
-        mine = [Unknown(row.parameter, row.sensor, None, row.axis)] if of[0] else []
-        mine += [Unknown(row.parameter, None, row.seat)] if of[1] else []
+        of = family(row.parameter)
+        within = (row.setting,) if of == "gain" else row.seat
+        mine = [] if of == "position" else [Unknown(row.parameter, row.sensor, None, within)]
+        mine += [] if of == "gain" else [Unknown(row.parameter, None, row.seat)]
         for unknown in mine:
             if number.setdefault(unknown, len(number)) == len(prior):
                 prior.append(row.prior / np.sqrt(len(mine)))

@@ -4,8 +4,10 @@ Recording j tells its calibration errors θ_j by a likelihood N(Λ_j⁻¹η_j, �
 
     θ_j = A_j x + w_j,    x ~ N(0, P),    w_j ~ N(0, T)
 
-x: of each sensor its gain and two tilts, of each seat (rig and channel) two tilts and three position errors; of a tilt
-the rig's variance is half the sensor's, half the seat's. w: mounting and temperature of one test. Without w_j,
+x: of each sensor its gain, and two tilts in each seat that it sat in (rig and channel): a cross-axis error is fixed in
+its case, and how that is rolled about its axis is another thing at each mounting. Of each seat two tilts and three
+position errors; of a tilt the rig's variance is half the sensor's, half the seat's. w: mounting and temperature of one
+test. Without w_j,
 
     Λ'_j = Λ_j − Λ_j (Λ_j + T⁻¹)⁻¹ Λ_j,    η'_j = η_j − Λ_j (Λ_j + T⁻¹)⁻¹ η_j                    (Woodbury)
     H = P⁻¹ + Σ A_jᵀ Λ'_j A_j,    H x = Σ A_jᵀ η'_j                      (least squares, Lindley & Smith 1972)
@@ -26,7 +28,8 @@ from typing import Final
 import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
-from nineaudit.campaign.health.records import Row, Seat, family
+from nineaudit.campaign.health.anchors import Seat
+from nineaudit.campaign.health.records import Row, family
 
 ANY_CHANGE: Final = 1e5
 """Prior standard deviation of a change, in records.UNIT: of one that no recording shows, 0 is as good as any."""
@@ -43,12 +46,13 @@ Scatter = dict[tuple[str, str], float]
 
 @dataclass(frozen=True)
 class Unknown:
-    """One entry of x: `parameter` of a sensor (its `sensor`) or of a `seat`."""
+    """One entry of x: `parameter` of a sensor (its `sensor`) or of a `seat`; `within` is the seat that a sensor with
+    this tilt sits in, the setting of a sensor with this gain (anchors.py)."""
 
     parameter: str
     sensor: str | None
     seat: Seat | None
-    axis: tuple[float, ...] = ()
+    within: tuple[str | int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

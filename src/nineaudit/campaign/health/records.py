@@ -1,7 +1,7 @@
 """From entries of the lake to what each recording says of its sensors, in the order of time.
 
 Rig files may restate a sensor (a new scale after a calibration, a position measured again). What is compared is the
-sensor itself: every likelihood is moved to what the rig said of it first,
+sensor itself: every likelihood is moved to what the rig said of it first (anchors.py),
 
     θ_first = Q θ + c,    η → Q η + Q Λ Qᵀ c,    Λ → Q Λ Qᵀ
 
@@ -19,18 +19,13 @@ from typing import Any, Final
 import numpy as np
 
 from nineaudit.array import FloatArray
+from nineaudit.campaign.health.anchors import Anchors, Place, Scale, Seat
 from nineaudit.campaign.health.identity import Names, names_of, tellers
-from nineaudit.estimate.calibration import perpendicular
 from nineaudit.report.sensors import unpacked
 from nineaudit.units import counted
 
 UNIT: Final = {"gain": 0.005, "tilt": 0.01, "position": 5e-4}
 """What errors are counted in here: relative, rad, m."""
-SAME_SCALE, SAME_PLACE = 0.2, 5e-3
-"""Restated by more (relative, m), it is another setting of the sensor, another seat."""
-
-Seat = tuple[str, str]
-"""Name of the rig, and channel."""
 
 
 def family(parameter: str) -> str:
@@ -41,20 +36,21 @@ def family(parameter: str) -> str:
 @dataclass(frozen=True, eq=False)
 class Row:
     """One error of one channel: its `sensor` (serial number, or rig and channel where it has none), `seat`, `kind`,
-    `parameter`, the rig's standard uncertainty `prior` in UNIT, and the axis as a name, of tilts."""
+    `parameter`, the rig's standard uncertainty `prior` in UNIT, and of a gain the `setting` that it is of."""
 
     sensor: str
     seat: Seat
     kind: str
     parameter: str
     prior: float
-    axis: tuple[float, ...] = ()
+    setting: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
     """One recording: `rows` of `eta` (p,) and `matrix` (p,p), in UNIT; `when` in days or places of the order; `label`
-    of it; `shock` by sensor, m/s²."""
+    of it; `shock` by sensor, m/s²; `moved` (p,), what its rig file puts right of what was stated first, in UNIT (None:
+    nothing)."""
 
     uri: str
     label: str
@@ -63,26 +59,25 @@ class Record:
     eta: FloatArray
     matrix: FloatArray
     shock: Mapping[str, float]
+    moved: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """Rows of a recording, UNIT over prior of each (`scale`), Q (`turn`, None: nothing restated) and c (`moved`)."""
+    """Rows of a recording, UNIT over prior of each (`scale`), Q (`turn`, None: nothing restated) and c (`moved`); the
+    `scales` of its sensors: what is stated, and what it is against."""
 
     rows: tuple[Row, ...]
     scale: FloatArray
     turn: FloatArray | None
     moved: FloatArray
+    scales: Mapping[str, tuple[float, Scale]]
 
 
 @dataclass(eq=False)
-class First:
-    """What rigs said first of each sensor and seat."""
+class First(Anchors):
+    """What rigs said first of each sensor and seat; `stated`, what was made of each rig file."""
 
-    scale: dict[str, float] = field(default_factory=dict)
-    place: dict[Seat, FloatArray] = field(default_factory=dict)
-    axis: dict[Seat, FloatArray] = field(default_factory=dict)
-    restated: set[str] = field(default_factory=set)
     stated: dict[str, Stated] = field(default_factory=dict)
 
 
@@ -129,8 +124,10 @@ def read_records(entries: Iterable[Mapping[str, Any]]) -> Records:
         sensors = names.sensors(rig, one.block["channels"])
         records.append(_record(one.uri, label, when, rig, sensors, one.block, first))
         serials |= {sensors[c["channel"]]: str(c["serial"]) for c in one.block["channels"] if c["serial"]}
-    if first.restated:
-        notes.append(f"stated in other units or settings, compared as stated: {', '.join(sorted(first.restated))}")
+    several = sorted(sensor for sensor, count in first.settings.items() if count > 1)
+    if several:
+        across = "stated with another scale after a move, or in other units, and their gains not compared across it"
+        notes.append(f"{across}: {', '.join(several)}")
     return Records(records, dated, notes, frozenset(serials), first, names, serials)
 
 
@@ -139,13 +136,14 @@ def _record(
 ) -> Record:
     told = block["information"]
     stated = _stated(rig, sensors, block, first)
+    first.last.update(stated.scales)
     eta, matrix = unpacked(told)
     eta, matrix = stated.scale * eta, stated.scale[:, None] * matrix * stated.scale
     if stated.turn is not None:
         matrix = stated.turn @ matrix @ stated.turn.T
         eta = stated.turn @ eta + matrix @ stated.moved
     shock = {sensors[c["channel"]]: float(c["shock"] or 0.0) for c in block["channels"]}
-    return Record(uri, label, when, stated.rows, eta, matrix, shock)
+    return Record(uri, label, when, stated.rows, eta, matrix, shock, None if stated.turn is None else stated.moved)
 
 
 def _stated(rig: str, sensors: Mapping[str, str], block: Mapping[str, Any], first: First) -> Stated:
@@ -157,65 +155,48 @@ def _stated(rig: str, sensors: Mapping[str, str], block: Mapping[str, Any], firs
         channels = {c["channel"]: c for c in block["channels"]}
         prior = np.array(told["prior"], dtype=np.float64)
         names = [(str(c), str(p)) for c, p in told["parameters"]]
-        seats = {c: _seat(rig, channels[c], first) for c in dict.fromkeys(name for name, _ in names)}
-        rows = tuple(_row(sensors[c], channels[c], p, u, seats[c]) for (c, p), u in zip(names, prior, strict=True))
+        places = {c: first.place(rig, c, channels[c]["position"], channels[c]["axis"]) for c in dict(names)}
+        gains = [(c, places[c].seat, float(channels[c]["scale"])) for c, p in names if p == "gain"]
+        scales = {c: first.scale(sensors[c], seat, scale) for c, seat, scale in gains}
+        rows = tuple(
+            _row(sensors[c], channels[c], p, u, places[c], scales) for (c, p), u in zip(names, prior, strict=True)
+        )
         scale = np.array([UNIT[family(row.parameter)] for row in rows]) / prior
-        turn, moved = _restated(rows, channels, names, first)
+        turn, moved = _restated(names, channels, places, scales)
         same = not moved.any() and np.array_equal(turn, np.eye(len(rows)))
-        first.stated[key] = Stated(rows, scale, None if same else turn, moved)
+        last = {sensors[c]: (scale, scales[c]) for c, _, scale in gains}
+        first.stated[key] = Stated(rows, scale, None if same else turn, moved, last)
     return first.stated[key]
 
 
-def _row(sensor: str, channel: Mapping[str, Any], parameter: str, prior: float, seat: Seat) -> Row:
-    axis = tuple(rounded(channel["axis"]).tolist()) if family(parameter) == "tilt" else ()
-    size = float(prior) / UNIT[family(parameter)]
-    return Row(sensor, seat, channel["kind"], parameter, size, axis)
-
-
-def _seat(rig: str, channel: Mapping[str, Any], first: First) -> Seat:
-    """The seat of a channel: another one where the rig has it at another place than before."""
-    place, name = np.array(channel["position"], dtype=np.float64), str(channel["channel"])
-    for again in range(1, 1000):
-        seat = (rig, name if again == 1 else f"{name} (place {again})")
-        if float(np.abs(first.place.setdefault(seat, place) - place).max()) <= SAME_PLACE:
-            return seat
-    return rig, name
-
-
-def rounded(axis: Iterable[float]) -> FloatArray:
-    """A direction to a degree or so, by which tilts of restated axes are compared."""
-    rough = np.round(np.array(list(axis), dtype=np.float64), 1) + 0.0
-    return np.asarray(rough / np.linalg.norm(rough))
+def _row(
+    sensor: str, said: Mapping[str, Any], parameter: str, prior: float, place: Place, scales: Mapping[str, Scale]
+) -> Row:
+    setting = scales[str(said["channel"])].setting if parameter == "gain" else 0
+    return Row(sensor, place.seat, said["kind"], parameter, float(prior) / UNIT[family(parameter)], setting)
 
 
 def _restated(
-    rows: tuple[Row, ...], channels: Mapping[str, Any], names: list[tuple[str, str]], first: First
+    names: list[tuple[str, str]],
+    channels: Mapping[str, Any],
+    places: Mapping[str, Place],
+    scales: Mapping[str, Scale],
 ) -> tuple[FloatArray, FloatArray]:
-    """(p,p) Q and (p,) c of the module's equation."""
-    turn, moved = np.eye(len(rows)), np.zeros(len(rows))
-    place = {name: i for i, name in enumerate(names)}
-    for i, (row, (channel, parameter)) in enumerate(zip(rows, names, strict=True)):
-        said = channels[channel]
+    """(p,p) Q and (p,) c of the module's equation, of the rows (channel, parameter) of `names`."""
+    turn, moved = np.eye(len(names)), np.zeros(len(names))
+    row = {name: i for i, name in enumerate(names)}
+    for i, (channel, parameter) in enumerate(names):
+        said, place = channels[channel], places[channel]
         if parameter == "gain":
-            moved[i] = _rescaled(row.sensor, float(said["scale"]), first) / UNIT["gain"]
+            moved[i] = scales[channel].restated(float(said["scale"])) / UNIT["gain"]
         elif family(parameter) == "position":
             at = "xyz".index(parameter[-1])
-            moved[i] = (said["position"][at] - first.place[row.seat][at]) / UNIT["position"]
-        elif parameter == "tilt_1" and (channel, "tilt_2") in place:
-            pair = [i, place[channel, "tilt_2"]]
-            axis = np.array(said["axis"], dtype=np.float64)
-            common = perpendicular(np.array(row.axis))
-            turn[np.ix_(pair, pair)] = common @ perpendicular(axis).T
-            moved[pair] = common @ (axis - first.axis.setdefault(row.seat, axis)) / UNIT["tilt"]
+            moved[i] = (said["position"][at] - place.position[at]) / UNIT["position"]
+        elif parameter == "tilt_1" and (channel, "tilt_2") in row:
+            pair = [i, row[channel, "tilt_2"]]
+            by, far = place.turned(np.array(said["axis"], dtype=np.float64))
+            turn[np.ix_(pair, pair)], moved[pair] = by, far / UNIT["tilt"]
     return turn, moved
-
-
-def _rescaled(sensor: str, scale: float, first: First) -> float:
-    ratio = float(np.log(scale / first.scale.setdefault(sensor, scale)))
-    if abs(ratio) <= SAME_SCALE:
-        return ratio
-    first.restated.add(sensor)
-    return 0.0
 
 
 def _day(text: object) -> int | None:

@@ -1,11 +1,13 @@
 """The improved calibration of a rig: what a campaign found of its sensors and seats, as numbers of the rig file.
 
-Against what the rig file says now, with g, τ and e the posterior means of gain, tilts and position error:
+Against what the rig file says now, with g, τ and e the posterior means of gain, tilts and position error, as they are
+after the last change:
 
     scale (1 + g),    axis n + τ_1 u_1 + τ_2 u_2,    position r + e
 
 and as uncertainties of a coming test those of the posterior, and the scatter from test to test, squares added. Only
-what the tests tell is written: u at most TOLD of the rig's, and a value beyond k u.
+what the tests tell is written: u at most TOLD of the rig's, and a value beyond k u; of a seat that no test was of, no
+position and no axis.
 """
 
 from __future__ import annotations
@@ -19,13 +21,17 @@ import numpy as np
 
 from nineaudit.array import FloatArray, Sensor
 from nineaudit.calibrating.changes import Keys
+from nineaudit.campaign.health.anchors import Place, Scale
 from nineaudit.campaign.health.assess import Health
+from nineaudit.campaign.health.deviations import seat_name
+from nineaudit.campaign.health.identity import of_rig_file
 from nineaudit.campaign.health.model import Solution
-from nineaudit.campaign.health.records import SAME_SCALE, UNIT, First, Seat, family, rounded
+from nineaudit.campaign.health.records import UNIT, Records, family
 from nineaudit.errors import ConfigurationError
 from nineaudit.estimate.calibration import perpendicular
 from nineaudit.finding import COVERAGE_FACTOR
 from nineaudit.report.numbers import plain
+from nineaudit.report.sensors import stated_scale
 from nineaudit.rig import Rig
 from nineaudit.units import factor
 
@@ -60,7 +66,10 @@ def improved(health: Health, rig: Rig) -> tuple[dict[str, Keys], list[Told]]:
 
     ConfigurationError where no test of the campaign is of this rig's sensors.
     """
-    found = [told for sensor in rig.array.sensors if (told := _told(health, rig, sensor)) is not None]
+    known = health.known
+    called, names = (rig.name, {}) if known is None else of_rig_file(known.names, rig)
+    stands = [] if known is None else [(s, _stands(known, called, names[s.channel], s)) for s in rig.array.sensors]
+    found = [told for sensor, one in stands if (told := _told(health, sensor, one)) is not None]
     if not found:
         rigs = sorted({seat[0] for member in health.seats for seat in member.seats})
         raise ConfigurationError(
@@ -107,47 +116,61 @@ def _keys(one: Told, sensor: Sensor, length: float) -> Keys:
     return keys
 
 
-def _told(health: Health, rig: Rig, sensor: Sensor) -> Told | None:
+@dataclass(frozen=True, eq=False)
+class Stands:
+    """What the records call a channel's `sensor`, and what its errors are against in them: the `place` of its seat and
+    the `scale` of its gain, None where no recording is of it."""
+
+    sensor: str
+    place: Place | None
+    scale: Scale | None
+
+
+def _stands(known: Records, rig: str, name: str, sensor: Sensor) -> Stands:
+    place = known.first.known_place(rig, sensor.channel, sensor.position.tolist(), sensor.axis.tolist())
+    return Stands(
+        name, place, known.first.known_scale(name, None if place is None else place.seat, stated_scale(sensor))
+    )
+
+
+def _told(health: Health, sensor: Sensor, stands: Stands) -> Told | None:
     """What is told of a channel; None where no test is of its sensor, or of its seat."""
-    selection, known = health.selection, health.known
-    if selection is None or known is None:
-        return None
-    name, seat = sensor.serial or f"{rig.name}/{sensor.channel}", (rig.name, sensor.channel)
-    for solution in selection.solutions:
-        places = _places(solution, name, seat, sensor)
-        if "gain" not in places:
-            continue
-        value: dict[str, float] = {}
-        told: dict[str, float] = {}
-        for parameter, at in places.items():
+    value: dict[str, float] = {}
+    told: dict[str, float] = {}
+    for solution in () if health.selection is None else health.selection.solutions:
+        for parameter, at in _entries(solution, stands).items():
             value[parameter], told[parameter] = _posterior(solution, at, UNIT[family(parameter)])
-        _as_stated(value, sensor, seat, name, known.first)
-        scatter = {p: health.scatter.get(f"{sensor.kind} {family(p)}", 0.0) for p in value}
-        members = [m for m in (*health.sensors, *health.seats) if m.name in (name, f"{seat[1]} of {seat[0]}")]
-        return Told(
-            channel=sensor.channel,
-            sensor=name,
-            tests=max((m.tests for m in members), default=0),
-            value=value,
-            u={p: math.hypot(told[p], scatter[p]) for p in value},
-            told=told,
-            prior={p: _prior(sensor, p) for p in value},
-            undecided=any(d.rivals for m in members for d in m.deviations),
-        )
-    return None
+    if not value:
+        return None
+    _as_stated(value, sensor, stands)
+    scatter = {p: health.scatter.get(f"{sensor.kind} {family(p)}", 0.0) for p in value}
+    seat = None if stands.place is None else seat_name(stands.place.seat)
+    members = [m for m in (*health.sensors, *health.seats) if m.name == (seat if m.is_seat else stands.sensor)]
+    return Told(
+        channel=sensor.channel,
+        sensor=stands.sensor,
+        tests=max((m.tests for m in members), default=0),
+        value=value,
+        u={p: math.hypot(told[p], scatter[p]) for p in value},
+        told=told,
+        prior={p: _prior(sensor, p) for p in value},
+        undecided=any(d.rivals for m in members for d in m.deviations),
+    )
 
 
 def _prior(sensor: Sensor, parameter: str) -> float:
     return {"gain": sensor.u_gain, "tilt": sensor.u_alignment, "position": sensor.u_position}[family(parameter)]
 
 
-def _places(solution: Solution, name: str, seat: Seat, sensor: Sensor) -> dict[str, list[int]]:
+def _entries(solution: Solution, stands: Stands) -> dict[str, list[int]]:
     """By parameter the unknowns whose sum it is; only where all of them are there."""
-    axis = tuple(rounded(sensor.axis).tolist())
+    seat = None if stands.place is None else stands.place.seat
+    setting = None if stands.scale is None else (stands.scale.setting,)
     out: dict[str, list[int]] = {}
     for i, unknown in enumerate(solution.part.unknowns):
-        own = unknown.sensor == name and unknown.axis in ((), axis)
-        if own or unknown.seat == seat:
+        within = setting if unknown.parameter == "gain" else seat
+        own = unknown.sensor == stands.sensor and unknown.within == within
+        if own or (seat is not None and unknown.seat == seat):
             out.setdefault(unknown.parameter, []).append(i)
     wanted = {"gain": 1, "tilt": 2, "position": 1}
     return {p: at for p, at in out.items() if len(at) == wanted[family(p)]}
@@ -162,20 +185,18 @@ def _posterior(solution: Solution, at: Sequence[int], unit: float) -> tuple[floa
     return unit * float(by @ solution.x), unit * float(np.sqrt(by @ solution.cov @ by))
 
 
-def _as_stated(value: dict[str, float], sensor: Sensor, seat: Seat, name: str, first: First) -> None:
+def _as_stated(value: dict[str, float], sensor: Sensor, stands: Stands) -> None:
     """From errors against what was stated first to those against this rig file (records.py), in place."""
-    from nineaudit.report.sensors import stated_scale
-
-    ratio = math.log(stated_scale(sensor) / first.scale.get(name, stated_scale(sensor)))
-    if "gain" in value and abs(ratio) <= SAME_SCALE:
-        value["gain"] -= ratio
+    if "gain" in value and stands.scale is not None:
+        value["gain"] -= stands.scale.restated(stated_scale(sensor))
+    if stands.place is None:
+        return
     for i, parameter in enumerate(PLACES):
         if parameter in value:
-            value[parameter] -= float(sensor.position[i] - first.place.get(seat, sensor.position)[i])
+            value[parameter] -= float(sensor.position[i] - stands.place.position[i])
     if all(name in value for name in TILTS):
-        common = perpendicular(rounded(sensor.axis))
-        moved = common @ (sensor.axis - first.axis.get(seat, sensor.axis))
-        turned: FloatArray = perpendicular(sensor.axis) @ common.T @ (np.array([value[t] for t in TILTS]) - moved)
+        turn, moved = stands.place.turned(sensor.axis)
+        turned: FloatArray = turn.T @ (np.array([value[t] for t in TILTS]) - moved)
         value.update(zip(TILTS, turned.tolist(), strict=True))
 
 

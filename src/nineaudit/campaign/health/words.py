@@ -23,6 +23,7 @@ _SINCE: Final = {
     "ramp": "growing since {since}",
     "count": "growing with the number of tests",
     "worst": "growing with the hardest shock before",
+    "level": "against what its rig file states since {since}",
 }
 _ADVICE: Final = {
     State.RECALIBRATE: "recalibrate",
@@ -44,7 +45,9 @@ def sentence(member: Member, found: Deviation) -> str:
     if found.shape in ("step", "ramp") and found.earliest != found.latest:
         when += f" (between {found.earliest} and {found.latest})"
     what = f"{_NAMES[found.parameter]} {amount(found.parameter, found.value, found.U)} (k = 2) {when}"
-    if found.rivals:
+    if found.restated:
+        advice = f"restated since {found.restated}"
+    elif found.rivals:
         advice = f"this or one of {', '.join(found.rivals)}: the tests do not tell which"
         advice += ", calibrate them" if found.beyond else ""
     else:
@@ -84,12 +87,13 @@ def summary(health: Health) -> list[str]:
     lines = [_counted(health)]
     if health.sensors:
         lines.append(
-            "gain: against what the rig first stated, ± at k = 2; an error that all sensors of a rig share is not seen"
+            "gain: against what the rig file in force states, ± at k = 2; an error that all sensors of a rig share is "
+            "not seen"
         )
     together = [m.name for m in health.sensors if not m.apart]
     if together:
         lines.append(
-            f"{len(together)} sensors never moved to another seat of their direction: their tilt and their seat's "
+            f"{counted(len(together), 'sensor')} sat alone in a seat: what is their tilt and what their seat's "
             "cannot be told apart"
         )
     return [*lines, *(printable(f"note: {note}") for note in health.notes)]
@@ -133,7 +137,8 @@ def _member(member: Member) -> dict[str, Any]:
 
 def _deviation(member: Member, found: Deviation) -> dict[str, Any]:
     numbers = {name: plain(getattr(found, name)) for name in ("value", "U", "z")}
-    words = {name: getattr(found, name) for name in ("parameter", "shape", "since", "earliest", "latest", "beyond")}
+    named = ("parameter", "shape", "since", "earliest", "latest", "beyond", "restated")
+    words = {name: getattr(found, name) for name in named}
     return {**words, **numbers, "rivals": list(found.rivals), "sentence": sentence(member, found)}
 
 
