@@ -17,7 +17,7 @@ from nineaudit.campaign.health.assess import Health, State, assess
 from nineaudit.campaign.health.identity import of_rig_file
 from nineaudit.campaign.health.page import section
 from nineaudit.campaign.health.records import read_records
-from nineaudit.campaign.health.words import text_table
+from nineaudit.campaign.health.words import document, text_table
 from nineaudit.campaign.task import audit_one
 from nineaudit.commands import simulated
 from nineaudit.identity import stated
@@ -116,6 +116,7 @@ def test_one_axis_of_a_triaxial_sensor_is_named() -> None:
     assert member.seats == (("head", "a1"),)
     assert noted(found, "on several channels").endswith(": 4711")
     assert "4711 accelerometer 2 (a1 of head): gain +" in text_table(found)
+    assert {s["serial"] for s in document(found)["sensors"]} == {"4711", "S3", "S4", "S5"}
     charts = section(found).charts
     assert charts[1].title.startswith("Gain of 4711 accelerometer 2 (a1 of head)")
     assert "4711 acce… 2" in [name for _, name in charts[0].across]

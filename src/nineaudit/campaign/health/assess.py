@@ -54,12 +54,13 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A sensor (`seats` it sat in) or a seat: `tests` it was in, from `first` to `last`, the level of each error that
-    lasts (value and U of the posterior, SI), what changed, and what is to be done (`state`)."""
+    """A sensor (`serial` number where it has one, `seats` it sat in) or a seat: `tests` it was in, from `first` to
+    `last`, the level of each error that lasts (value and U of the posterior, SI), what changed, and what is to be done
+    (`state`)."""
 
     name: str
     is_seat: bool
-    serial: bool
+    serial: str | None
     seats: tuple[Seat, ...]
     tests: int
     first: str
@@ -144,7 +145,7 @@ def _members(number: int, chosen: Selection, known: Records, tolerance: float) -
             Member(
                 name=name,
                 is_seat=is_seat,
-                serial=name in known.named,
+                serial=known.serials.get(name, name) if name in known.named else None,
                 seats=tuple(sorted(sat[is_seat, name])),
                 tests=len(tests),
                 first=known.records[tests[0]].label if tests else "",

@@ -123,7 +123,7 @@ def document(health: Health) -> dict[str, Any]:
 def _member(member: Member) -> dict[str, Any]:
     return {
         "name": member.name,
-        "serial": member.name if member.serial else None,
+        "serial": member.serial,
         "seats": [{"rig": rig, "channel": channel} for rig, channel in member.seats],
         "tests": member.tests,
         "first": member.first,
