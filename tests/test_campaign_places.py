@@ -236,11 +236,15 @@ def test_an_edition_without_results_is_no_reason_to_empty_the_tables() -> None:
 def test_the_rig_is_there_where_the_inputs_are(monkeypatch: pytest.MonkeyPatch) -> None:
     lake, document = lakes.open_lake("lake", create=True), collect("rig.toml")
 
-    def killed(*_: Any) -> None:
-        raise KeyboardInterrupt
+    write, done = lakes.write_bytes, []
+
+    def killed(*asked: Any) -> None:
+        if done:
+            raise KeyboardInterrupt
+        done.append(write(*asked))
 
     with monkeypatch.context() as killing:
-        killing.setattr(lakes, "write", killed)
+        killing.setattr(lakes, "write_bytes", killed)
         with pytest.raises(KeyboardInterrupt):
             task.prepare(lake, document)
     task.prepare(lake, document)
