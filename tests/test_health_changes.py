@@ -170,3 +170,13 @@ def test_a_neighbour_that_was_taken_first_is_cleared_when_the_two_that_drift_are
         (one,) = changes(member)
         assert (member.state, one.rivals) == (State.RECALIBRATE, ())
         assert abs(one.value - 0.03) < 1.5 * one.U
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+def test_two_that_drift_are_not_taken_for_a_third_that_is_between_them(seed: int) -> None:
+    """With few tests a2 explains so much that a0 and a1 add nothing significant, one by one: a2 was accused alone."""
+    both = of_channel(0, 4.0) + of_channel(1, 4.0)
+    found = campaign(seed, 200, 8, 2.0 * TRIAD, lambda past: both * (past >= 0.5), scatter=0.1)
+    assert {m.name for m in accused(found)} == {"S00", "S01"}
+    alone = campaign(seed, 200, 8, 2.0 * TRIAD, lambda past: of_channel(2, -6.0) * (past >= 0.5), scatter=0.1)
+    assert {m.name for m in accused(alone)} == {"S02"}

@@ -3,8 +3,9 @@
 A sensor that drifts pulls the estimates of its neighbours with it; once its change is in the model, they are cleared. A
 sensor may change more than once. What was taken first may be wrong by what is taken later (the third of a triad of
 which two drift; one step for one up and one down), so when nothing more is significant, each change is looked for again
-about the others: where another explains more, or it is not significant, or made by bad tests, it goes, and the
-selection goes on. As Z² is what a change gains in 2 ln L, each of these steps makes
+about the others: where another explains more, or it is not significant, or made by bad tests, it goes; where two
+explain so much more that both are significant, they take its place; and the selection goes on. As Z² is what a change
+gains in 2 ln L, each of these steps makes
 
     2 ln L − threshold² · (number of changes)
 
@@ -31,7 +32,9 @@ from nineaudit.campaign.health.scatter import estimate_scatter
 
 MARGIN: Final = 2.0 * log(100.0)
 """Of Z²: likelihood odds of 1 : 100."""
-MOST_CHANGES, MOST_OUTLYING, ROUNDS = 50, 20, 30
+MOST_CHANGES, MOST_OUTLYING, MOST_PAIRS, ROUNDS = 50, 20, 10, 30
+BETWEEN: Final = 0.5
+"""Of a change's |Z|, that of the first of two which are looked at instead."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,7 @@ def _selected(
     seen = look(solve(part, scatter, _shapes(changes)))
     for _ in range(ROUNDS):
         part, seen = _grown(part, seen, changes, out, scatter, size)
-        again = _reviewed(seen, changes, out, size)
+        again = _reviewed(seen, changes, out, size) or _paired(seen, changes, size)
         if again is None:
             break
         seen = again
@@ -119,6 +122,21 @@ def _reviewed(seen: Look, changes: list[Selected], out: Sequence[int], size: int
             del changes[k]
             return rest
         changes[k] = Selected(ranked[0], tuple(ranked[1:]))
+    return None
+
+
+def _paired(seen: Look, changes: list[Selected], size: int) -> Look | None:
+    """Where two changes explain so much more than one which is between them that both are significant: the look with
+    the first of the two in its place."""
+    for k, mine in enumerate(changes):
+        rest, z2 = look_without(seen, k), mine.found.z**2
+        near = [one for one in scan(rest, size, (1.0 - BETWEEN**2) * z2) if one.unknown != mine.found.unknown]
+        for one in near[:MOST_PAIRS]:
+            with_one = look_again(rest, change(one))
+            other = next(iter(scan(with_one, size, MARGIN)), None)
+            if other is not None and one.z**2 + other.z**2 > z2 + threshold() ** 2:
+                changes[k:] = [*changes[k + 1 :], Selected(one, ())]
+                return with_one
     return None
 
 
