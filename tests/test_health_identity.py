@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import nineaudit as na
-from health_entries import Entry, entry
+from health_entries import AXES, POSITIONS, SERIALS, Entry, entry
 from nineaudit.campaign.health.assess import Health, State, assess
 from nineaudit.campaign.health.identity import of_rig_file
 from nineaudit.campaign.health.page import section
 from nineaudit.campaign.health.records import read_records
+from nineaudit.campaign.health.rig_file import improved
 from nineaudit.campaign.health.words import document, text_table
 from nineaudit.campaign.task import audit_one
 from nineaudit.commands import simulated
@@ -120,6 +121,26 @@ def test_one_axis_of_a_triaxial_sensor_is_named() -> None:
     charts = section(found).charts
     assert charts[1].title.startswith("Gain of 4711 accelerometer 2 (a1 of head)")
     assert "4711 acce… 2" in [name for _, name in charts[0].across]
+
+
+def test_the_scale_of_one_axis_of_a_triaxial_sensor_is_written_back() -> None:
+    """And of that axis alone, in the rig of its item."""
+    tests = [
+        entry(i, {(1, "gain"): 0.02 * (item == "B")}, serials=TRIAX if item == "B" else SERIALS, test=stands)
+        for i in range(40)
+        for item in ("AB"[i % 2],)
+        for stands in ({"item_serial": item},)
+    ]
+    text = '[rig]\nname = "head"\n[test]\nitem_serial = "B"\n[units]\nacceleration = "m/s^2"\n'
+    text += "[uncertainty]\ngain = 0.005\n"
+    for c in range(6):
+        place = [1000 * x for x in POSITIONS[c]]
+        text += f'[[sensor]]\nchannel = "a{c}"\nkind = "accelerometer"\nserial = "{TRIAX[c]}"\nscale = 1.0\n'
+        text += f"position = {place}\naxis = {list(AXES[c])}\n"
+    changes, told = improved(assess(tests), parse_rig(text))
+    assert [one.sensor for one in told][:4] == [*(f"4711 accelerometer {i}" for i in (1, 2, 3)), "S3"]
+    assert {c for c, keys in changes.items() if "scale" in keys} == {"a1"}
+    assert changes["a1"]["scale"] == pytest.approx(1.02, abs=2e-3)
 
 
 def test_an_accelerometer_and_a_gyroscope_of_one_serial_number_are_two() -> None:
