@@ -16,6 +16,7 @@ from nineaudit.campaign.health.assess import Health, Member, State, assess, asse
 from nineaudit.campaign.health.deviations import Deviation
 from nineaudit.campaign.health.records import Record, Records, Row
 from nineaudit.campaign.health.rig_file import improved
+from nineaudit.campaign.health.words import sentence
 from nineaudit.rig import Rig, parse_rig
 
 CHANNELS = 6
@@ -111,6 +112,11 @@ def test_a_sensor_that_comes_back_has_two_changes_and_its_twin_none() -> None:
     assert (member.name, up.rivals, down.rivals) == ("S03", (), ())
     assert abs(up.value - 0.04) < up.U < 0.003
     assert abs(down.value + 0.04) < down.U < 0.003
+    assert member.state is State.WATCH
+    for one in (up, down):
+        assert one.now is not None
+        assert abs(one.now[0]) < one.now[1] < 0.003
+        assert ", with its other changes " in sentence(member, one)
     # the first tests of the rig with it and without it
     assert up.earliest <= "2026-06-18" <= up.latest
     assert down.earliest <= "2026-11-21" <= down.latest
@@ -143,8 +149,11 @@ def test_two_steps_are_two_changes_not_one_that_is_too_large() -> None:
     found = campaign(1, 480, 12, 20.0 * TWINS, lambda past: of_channel(3, 8.0 * (past >= 0.33) + 8.0 * (past >= 0.66)))
     (member,) = accused(found)
     assert (member.name, [d.shape for d in changes(member)]) == ("S03", ["step", "step"])
+    assert [d.since for d in changes(member)] == sorted(d.since for d in changes(member))
     for one in changes(member):
         assert abs(one.value - 0.04) < one.U < 0.003
+        assert one.now is not None
+        assert abs(one.now[0] - 0.08) < one.now[1] < 0.003
 
 
 @pytest.mark.parametrize(("seed", "bad"), [(2, 196), (6, 3), (10, 199)])

@@ -28,7 +28,8 @@ class Deviation:
     """A significant change: `parameter` by `value` ± `U` (SI), in the way of `shape`, since the recording `since`, by
     the readings between `earliest` and `latest`; |Z| `z`; `rivals`, names of others that may be it; whether what is
     left of it is `beyond` the tolerance, or which recording is the first of a rig file that puts it right (`restated`).
-    Of the shape `level`: a gain that is not what its rig file states."""
+    Of the shape `level`: a gain that is not what its rig file states. `now`: value and U (SI) of all changes together,
+    where there are several of the same error."""
 
     parameter: str
     value: float
@@ -41,6 +42,7 @@ class Deviation:
     rivals: tuple[str, ...]
     beyond: bool
     restated: str = ""
+    now: tuple[float, float] | None = None
 
 
 def name_of(unknown: Unknown) -> str:
@@ -54,10 +56,10 @@ def seat_name(seat: Seat) -> str:
 
 
 def deviations(selected: Sequence[Selected], mine: Standing, tolerance: float) -> dict[Key, list[Deviation]]:
-    """What changed, by whom it may be of: every rival has it too, with the others named."""
+    """What changed, in order of time, by whom it may be of: every rival has it too, with the others named."""
     unknowns = mine.solution.part.unknowns
     out: dict[Key, list[Deviation]] = {}
-    for k, one in enumerate(selected):
+    for k, one in sorted(enumerate(selected), key=lambda numbered: numbered[1].found.first):
         group: dict[Key, Found] = {}
         for found in (one.found, *one.rivals):
             group.setdefault(key_of(unknowns[found.unknown]), found)
@@ -129,6 +131,7 @@ def _change(
     if parameter == "gain" and number is not None:
         inside.append(abs(unit * (e - mine.moved(found.unknown))) <= limit - COVERAGE_FACTOR * unit * wider * u_e)
     since, earliest, latest = (mine.records[i].label for i in (found.first, found.earliest, found.latest))
+    others = sum(c.unknown == found.unknown for c in mine.solution.changes) - (number is not None)
     return Deviation(
         parameter=parameter,
         value=unit * value,
@@ -141,6 +144,7 @@ def _change(
         rivals=rivals,
         beyond=not any(inside),
         restated=_restated(found, mine) if any(inside) else "",
+        now=(unit * gone, COVERAGE_FACTOR * unit * wider * u_gone) if others else None,
     )
 
 

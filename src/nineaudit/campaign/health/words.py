@@ -44,6 +44,8 @@ def sentence(member: Member, found: Deviation) -> str:
     when = _SINCE[found.shape].format(since=found.since)
     if found.shape in ("step", "ramp") and found.earliest != found.latest:
         when += f" (between {found.earliest} and {found.latest})"
+    if found.now is not None:
+        when += f", with its other changes {amount(found.parameter, *found.now)} now"
     what = f"{_NAMES[found.parameter]} {amount(found.parameter, found.value, found.U)} (k = 2) {when}"
     if found.restated:
         advice = f"restated since {found.restated}"
@@ -139,7 +141,8 @@ def _deviation(member: Member, found: Deviation) -> dict[str, Any]:
     numbers = {name: plain(getattr(found, name)) for name in ("value", "U", "z")}
     named = ("parameter", "shape", "since", "earliest", "latest", "beyond", "restated")
     words = {name: getattr(found, name) for name in named}
-    return {**words, **numbers, "rivals": list(found.rivals), "sentence": sentence(member, found)}
+    now = None if found.now is None else {"value": plain(found.now[0]), "U": plain(found.now[1])}
+    return {**words, **numbers, "now": now, "rivals": list(found.rivals), "sentence": sentence(member, found)}
 
 
 __all__ = ["SCHEMA", "amount", "called", "document", "sentence", "summary", "text_table"]
