@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -145,6 +147,13 @@ def test_a_channel_of_another_name_is_another_recording(mme: str) -> None:
     before = signature([mme])
     Path("test/t.001").rename("test/t.003")
     assert signature([mme]) != before
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="names there are Unicode")
+def test_a_name_beside_a_test_need_not_be_utf_8(mme: str) -> None:
+    before = signature([mme])
+    Path(os.fsdecode(os.fsencode(Path(mme).parent) + b"/Pr\xfcfung.jpg")).write_bytes(b"x")
+    assert signature([mme]) not in (None, before)
 
 
 @pytest.mark.parametrize(

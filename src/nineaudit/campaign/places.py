@@ -109,7 +109,7 @@ def signature(uris: Sequence[str]) -> str | None:
         said = [_signature(file) for uri in uris for file in _with_company(uri)]
     if any(one is None for one in said):
         return None
-    return hashlib.sha256("\0".join(str(one) for one in said).encode()).hexdigest()
+    return hashlib.sha256("\0".join(str(one) for one in said).encode(errors="surrogateescape")).hexdigest()
 
 
 @contextmanager
