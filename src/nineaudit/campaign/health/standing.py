@@ -10,10 +10,11 @@ unknown and β_k its changes, as far as they went, what is left of them, and of 
     H → H − 1 1ᵀ/p²,    m = x̂ p²/(p² − v),    var m = v p²/(p² − v),    z = (m − c)/√(u² + var m)
 
 v the posterior variance: z is standard normal if all are as their rig files state. A gain is beyond where |z| is above
-that of one false alarm in 2,000 and |m − c| > tolerance + k √(var m): a tolerance of 2 u alone would accuse one good
+that of one false alarm in 4,000 and |m − c| > tolerance + k √(var m): a tolerance of 2 u alone would accuse one good
 sensor in 20. The largest |z| first; its prior stays out, for what it has that its rig does not state pulls the others
 the other way. Where the others scatter about their statements more than these say (median |z|), z is smaller by that.
-Those within 1 : 100 of the best are its rivals (of two gains whose difference is all that is seen).
+Rivals of the best are within 1 : 100 of it, and without their prior it would not be beyond (of two gains whose
+difference is all that is seen).
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ from nineaudit.campaign.health.scan import FALSE_ALARM
 from nineaudit.campaign.health.select import MARGIN
 from nineaudit.finding import COVERAGE_FACTOR
 
-LEVEL: Final = NormalDist().inv_cdf(1.0 - FALSE_ALARM / 4.0)
-"""|z| above which a gain is not what its rig file states, two-sided: half of the false alarms are left to changes."""
+LEVEL: Final = NormalDist().inv_cdf(1.0 - FALSE_ALARM / 8.0)
+"""|z| above which a gain is not what its rig file states, two-sided: a quarter of all false alarms."""
 MEDIAN: Final = NormalDist().inv_cdf(0.75)
 """Of |z|, z standard normal."""
 LEAST_LEFT: Final = 1e-9
@@ -131,19 +132,23 @@ def levels_beyond(
     """Gains that are not what their rig files state, each with its rivals; `scattered`: by unknown that has recordings
     enough, by how much its readings scatter more than the model says."""
     unknowns = mine.solution.part.unknowns
-    left = [i for i in scattered if unknowns[i].parameter == "gain" and mine.in_force(i)]
-    x, cov = mine.solution.x.copy(), mine.solution.cov.copy()
+    gains = [i for i in scattered if unknowns[i].parameter == "gain" and mine.in_force(i)]
+    x, cov = mine.solution.x, mine.solution.cov
     out = []
-    judged = [_level(mine, x, cov, i, scattered[i]) for i in left]
+    judged = [_level(mine, x, cov, i, scattered[i]) for i in gains]
     while beyond := [one for one in judged if abs(one.z) > LEVEL and abs(one.e) > tolerance + one.U]:
         best = max(beyond, key=lambda one: abs(one.z))
-        _free(mine, x, cov, best.unknown)
         others = [one for one in judged if one is not best]
-        judged = [_level(mine, x, cov, one.unknown, scattered[one.unknown]) for one in others]
+        freed = _free(mine, x, cov, best.unknown)
+        judged = [_level(mine, *freed, one.unknown, scattered[one.unknown]) for one in others]
         wider = max(float(np.median([abs(one.z) for one in judged])) / MEDIAN, 1.0) if judged else 1.0
         if abs(best.z) <= LEVEL * wider:
             break
-        out.append((best, tuple(one for one in others if best.z**2 - one.z**2 < MARGIN * wider**2)))
+        near = [one for one in others if best.z**2 - one.z**2 < MARGIN * wider**2]
+        without = [_level(mine, *_free(mine, x, cov, r.unknown), best.unknown, scattered[best.unknown]) for r in near]
+        rivals = (r for r, one in zip(near, without, strict=True) if abs(one.z) <= LEVEL * wider)
+        out.append((best, tuple(rivals)))
+        x, cov = freed
     return out
 
 
@@ -166,11 +171,10 @@ def _without_prior(mine: Standing, cov: FloatArray, unknown: int) -> float:
     return 1.0 / max(prior - float(cov[unknown, unknown]), LEAST_LEFT * prior)
 
 
-def _free(mine: Standing, x: FloatArray, cov: FloatArray, unknown: int) -> None:
-    """The prior of an unknown taken out of the solution, in place."""
-    factor, column = _without_prior(mine, cov, unknown), cov[:, unknown].copy()
-    x += factor * x[unknown] * column
-    cov += np.outer(factor * column, column)
+def _free(mine: Standing, x: FloatArray, cov: FloatArray, unknown: int) -> tuple[FloatArray, FloatArray]:
+    """The solution without the prior of an unknown."""
+    factor, column = _without_prior(mine, cov, unknown), cov[:, unknown]
+    return x + factor * x[unknown] * column, cov + np.outer(factor * column, column)
 
 
 __all__ = ["LEVEL", "Level", "Standing", "levels_beyond", "standing"]
