@@ -87,8 +87,9 @@ def _selected(
         part, seen = _grown(part, seen, changes, out, scatter, size)
         again = _reviewed(seen, changes, out, size) or _paired(seen, changes, size)
         if again is None:
-            break
+            return part, seen.solution
         seen = again
+    part, seen = _grown(part, seen, changes, out, scatter, size)
     return part, seen.solution
 
 
