@@ -29,6 +29,7 @@ import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
 from nineaudit.campaign.health.anchors import Seat
+from nineaudit.campaign.health.blocks import blocks, solved
 from nineaudit.campaign.health.records import Row, family
 
 ANY_CHANGE: Final = 1e5
@@ -161,10 +162,9 @@ def precision(part: Part, changes: Sequence[Change]) -> FloatArray:
     return np.asarray(part.prior**-2.0 / (1.0 + FREE**2 * changed))
 
 
-def solve(part: Part, tau: Scatter, changes: Sequence[Change] = ()) -> Solution:
-    """The unknowns and the changes, by the model's equations; a change and the level before it have hardly a prior."""
-    from scipy.linalg import cho_factor, cho_solve
-
+def solve(part: Part, tau: Scatter, changes: Sequence[Change] = (), across: bool = True) -> Solution:
+    """The unknowns and the changes, by the model's equations; a change and the level before it have hardly a prior.
+    Where not `across`, the covariance is of what recordings tell together only (blocks.py): the rest is 0."""
     n = len(part.unknowns)
     size = n + len(changes)
     normal, right = np.zeros((size, size)), np.zeros(size)
@@ -184,15 +184,7 @@ def solve(part: Part, tau: Scatter, changes: Sequence[Change] = ()) -> Solution:
             right[n + k] += float(np.sum(column * one.eta))
             for other, theirs in columns:
                 normal[n + other, n + k] += float(np.sum(theirs * told))
-    root = cho_factor(normal, lower=True)
-    return Solution(part, tuple(changes), marginals, cho_solve(root, right), _inverse(root[0]))
-
-
-def _inverse(root: FloatArray) -> FloatArray:
-    """(n,n) H⁻¹ from the lower Cholesky factor of H. Not by blocks: what a tilt of a sensor and one of its seat have in
-    common, 10⁶ of the prior, would be lost in their difference."""
-    from scipy.linalg.lapack import dpotri
-
-    half, _ = dpotri(root, lower=1)
-    below = np.tril(half)
-    return np.asarray(below + np.tril(below, -1).T)
+    gains = [i for i, one in enumerate(part.unknowns) if one.parameter == "gain"]
+    joint = np.array([*gains, *range(n, size)], dtype=np.intp)
+    x, cov = solved(normal, right, blocks(n, [g.at for g in part.groups], joint), joint, across)
+    return Solution(part, tuple(changes), marginals, x, cov)

@@ -33,7 +33,7 @@ def estimate_scatter(
     families = sorted({(r.kind, family(r.parameter)) for part in parts for g in part.groups for r in g.rows})
     tau = dict.fromkeys(families, 0.2**2) | (start or {})
     for _ in range(ROUNDS):
-        ratio = _ratios([solve(p, tau, c) for p, c in zip(some, changes, strict=True) if p.groups], tau)
+        ratio = _ratios([solve(p, tau, c, across=False) for p, c in zip(some, changes, strict=True) if p.groups], tau)
         tau = {f: max(tau[f] * ratio[f], LEAST) for f in families}
         if all(abs(np.log(ratio[f])) < SETTLED or tau[f] == LEAST for f in families):
             break
