@@ -138,8 +138,10 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-def test_ctrl_c_stops_at_once_and_loses_nothing() -> None:
+def test_ctrl_c_stops_at_once_loses_nothing_and_leaves_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     campaign(Path(), [f"T{i}.csv" for i in range(6)])
+    (folder / "tmp").mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder / "tmp"))
     with subprocess.Popen(
         [sys.executable, "-c", _PROGRAM, "local"], stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as run:
@@ -149,6 +151,7 @@ def test_ctrl_c_stops_at_once_and_loses_nothing() -> None:
     assert run.returncode == 130, said
     assert "Traceback" not in said, said
     assert "of 6 recordings: run it again with --resume" in said
+    until(lambda: not any((folder / "tmp").glob("nineaudit-*")), seconds=10)
     done = contents(Path("lake"))
     assert len(done) == 3
     _, shown, _ = told(plan(Path(), "./tests", resume=True))
