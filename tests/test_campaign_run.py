@@ -112,6 +112,7 @@ def test_a_killed_scheduler_loses_nothing_and_the_lake_comes_out_the_same(
         scheduler[1].kill()
         _, said = run.communicate(timeout=120)
     assert run.returncode == 3, said
+    assert "of 6 recordings: run it again with --resume" in said
     assert "the scheduler went away" in said
     assert "Traceback" not in said
     assert "--resume" in said

@@ -22,7 +22,7 @@ from nineaudit.campaign.places import is_local, local_path
 from nineaudit.campaign.settings import collect, load
 from nineaudit.campaign.sources import Found, find
 from nineaudit.campaign.waiving import unmatched
-from nineaudit.errors import ConfigurationError
+from nineaudit.errors import ConfigurationError, NineauditError
 
 if TYPE_CHECKING:
     from nineaudit.campaign.requests import Request
@@ -126,7 +126,7 @@ def _watched(
             code = max(code, exit_code(summary, plan.fail_on))
             if "reason" in summary:
                 say(summary["reason"])
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, NineauditError):
         say(f"stopped after {verdicts.total()} of {total} recordings: run it again with --resume to go on")
         raise
     show(_tally(plan.lake, verdicts, kept))
