@@ -57,8 +57,8 @@ def threshold() -> float:
 @dataclass(frozen=True, eq=False)
 class Found:
     """The best change of one unknown: `shape` (step, ramp, count, worst) from `first` on, the index of a recording
-    (the first that it can be in, and `earliest`, `latest` by shapes that explain nearly as much); `z`, how far it
-    goes (`size`), and the `track`."""
+    (the first that it can be in, and `earliest`, `latest` by shapes that explain nearly as much); `z`, what it is worth
+    (`gain`, of 2 ln L), how far it goes (`size`), and the `track`."""
 
     unknown: int
     shape: str
@@ -66,18 +66,19 @@ class Found:
     earliest: int
     latest: int
     z: float
+    gain: float
     size: float
     amount: FloatArray
     track: Track
 
 
 def scan(seen: Look, size: int, margin: float = np.inf) -> list[Found]:
-    """The best change of every unknown that is seen, largest |Z| first and while Z² is within `margin` of it; of what
-    the model has already nothing is left to be seen. `size`: recordings of the campaign."""
+    """The best change of every unknown that is seen, the significant first, by what they explain, and while Z² is within
+    `margin` of the first; of what the model has already nothing is left to be seen. `size`: recordings of the campaign."""
     solution = seen.solution
     residuals = [solution.residual(one) for one in solution.marginals]
     ranked = [one for sight in seen.sights for one in _best(sight, residuals)]
-    ranked.sort(key=lambda one: (-round(abs(float(one.z[one.top])), EVEN), one.unknown))
+    ranked.sort(key=lambda one: (abs(one.z[one.top]) < threshold(), -round(_gain(one), EVEN), one.unknown))
     return [_found(one, size) for one in ranked if _less(ranked[0], one) < margin]
 
 
@@ -94,6 +95,12 @@ class Best:
     size: float
     each: FloatArray
     wider: float
+
+
+def _gain(one: Best) -> float:
+    """2 Δ ln L of a change. A scatter that may be that of the model, estimated by so few, is no reason to take another:
+    at Z = 50 a tenth of it is worth 500."""
+    return float(one.z[one.top] * (one.wider if one.wider < ALIKE else 1.0)) ** 2
 
 
 def _less(best: Best, one: Best) -> float:
@@ -140,6 +147,7 @@ def _found(one: Best, size: int) -> Found:
         earliest,
         latest,
         float(z[top]),
+        _gain(one),
         one.size,
         amount,
         track(crowd, one.place, one.each),

@@ -19,7 +19,7 @@ them is accused alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log
 from typing import Final
 
@@ -27,14 +27,19 @@ import numpy as np
 
 from nineaudit.campaign.health.look import Look, look, look_again, look_without
 from nineaudit.campaign.health.model import Change, Part, Scatter, Solution, solve
-from nineaudit.campaign.health.scan import Found, change, outlying, scan, threshold
+from nineaudit.campaign.health.scan import ALIKE, Found, change, excess, outlying, scan, threshold
 from nineaudit.campaign.health.scatter import estimate_scatter
 
 MARGIN: Final = 2.0 * log(100.0)
 """Of Z²: likelihood odds of 1 : 100."""
-MOST_CHANGES, MOST_OUTLYING, MOST_PAIRS, ROUNDS = 50, 20, 10, 30
+MOST_CHANGES, MOST_OUTLYING, MOST_PAIRS, ROUNDS, TIMES = 50, 20, 10, 50, 5
+SETTLED: Final = 1.0
+"""Of 2 ln L: another date of a change that gains less is as good."""
 BETWEEN: Final = 0.5
 """Of a change's |Z|, that of the first of two which are looked at instead."""
+
+Name = tuple[int, str, int]
+"""Of a change: its unknown, its shape, its first recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +70,14 @@ def select(parts: Sequence[Part], size: int) -> Selection:
     kept, out = list(parts), list[int]()
     changes: list[list[Selected]] = [[] for _ in parts]
     scatter: Scatter | None = None
-    for _ in range(ROUNDS):
+    for _ in range(TIMES):
         scatter = estimate_scatter(kept, [_shapes(mine) for mine in changes], scatter)
-        before = [*map(_named, changes)], len(out)
+        before = [list(map(_name, mine)) for mine in changes], len(out)
         solutions = []
         for i in range(len(kept)):
             kept[i], solution = _selected(kept[i], changes[i], out, scatter, size)
             solutions.append(solution)
-        if before == ([*map(_named, changes)], len(out)):
+        if before == ([list(map(_name, mine)) for mine in changes], len(out)):
             break
     assert scatter is not None
     return Selection(tuple(kept), tuple(solutions), tuple(map(tuple, changes)), scatter, tuple(sorted(out)))
@@ -83,9 +88,10 @@ def _selected(
 ) -> tuple[Part, Solution]:
     """The part with `changes` as they are to be, without the recordings added to `out`."""
     seen = look(solve(part, scatter, _shapes(changes)))
+    tried: set[Name] = set()
     for _ in range(ROUNDS):
         part, seen = _grown(part, seen, changes, out, scatter, size)
-        again = _reviewed(seen, changes, out, size) or _paired(seen, changes, size)
+        again = _reviewed(seen, changes, out, size) or _paired(seen, changes, tried, size)
         if again is None:
             return part, seen.solution
         seen = again
@@ -115,36 +121,46 @@ def _reviewed(seen: Look, changes: list[Selected], out: Sequence[int], size: int
     """Each change with its rivals about the others, the weakest first; where one is not what it was taken for, the look
     without it."""
     n = len(seen.solution.part.unknowns)
-    sure = np.abs(seen.solution.x[n:]) / np.sqrt(np.diag(seen.solution.cov)[n:])
-    for k in np.argsort(sure, kind="stable").tolist():
+    x, u = seen.solution.x[n:], np.sqrt(np.diag(seen.solution.cov)[n:])
+    for k in np.argsort(np.abs(x) / u, kind="stable").tolist():
         rest = look_without(seen, k)
         ranked = scan(rest, size, MARGIN)
-        if not ranked or not _stands(ranked[0], changes[k].found, out):
+        still = _still(ranked[0], changes[k].found, float(x[k]), float(u[k]), out) if ranked else None
+        if still is None:
             del changes[k]
             return rest
-        changes[k] = Selected(ranked[0], tuple(ranked[1:]))
+        changes[k] = Selected(still, tuple(ranked[1:]))
     return None
 
 
-def _paired(seen: Look, changes: list[Selected], size: int) -> Look | None:
+def _paired(seen: Look, changes: list[Selected], tried: set[Name], size: int) -> Look | None:
     """Where two changes explain so much more than one which is between them that both are significant: the look with
-    the first of the two in its place."""
+    the first of the two in its place. Of each once: those `tried` are added to."""
     for k, mine in enumerate(changes):
-        rest, z2 = look_without(seen, k), mine.found.z**2
-        near = [one for one in scan(rest, size, (1.0 - BETWEEN**2) * z2) if one.unknown != mine.found.unknown]
+        if _name(mine) in tried:
+            continue
+        tried.add(_name(mine))
+        rest, gain = look_without(seen, k), mine.found.gain
+        near = [one for one in scan(rest, size, (1.0 - BETWEEN**2) * gain) if one.unknown != mine.found.unknown]
         for one in near[:MOST_PAIRS]:
             with_one = look_again(rest, change(one))
             other = next(iter(scan(with_one, size, MARGIN)), None)
-            if other is not None and one.z**2 + other.z**2 > z2 + threshold() ** 2:
+            if other is not None and one.gain + other.gain > gain + threshold() ** 2:
                 changes[k:] = [*changes[k + 1 :], Selected(one, ())]
                 return with_one
     return None
 
 
-def _stands(best: Found, taken: Found, out: Sequence[int]) -> bool:
-    """Whether the best change about the others is the one that was taken, significant, and not of bad tests."""
-    same = best.unknown == taken.unknown and np.array_equal(best.amount, taken.amount)
-    return same and abs(best.z) >= threshold() and not _bad(best, out)
+def _still(best: Found, taken: Found, x: float, u: float, out: Sequence[int]) -> Found | None:
+    """The change that was taken, x ± u, as it is about the others; None where another is better than it (of its own
+    shapes, by more than SETTLED), or where the best is not significant or made by bad tests."""
+    wider = excess(best.track)
+    gain = (x / u) ** 2 / (wider**2 if wider >= ALIKE else 1.0)
+    better = best.unknown != taken.unknown or best.gain - gain > SETTLED
+    if better or abs(best.z) < threshold() or _bad(best, out):
+        return None
+    same = np.array_equal(best.amount, taken.amount)
+    return best if same else replace(taken, z=x / u / wider, gain=gain, size=x, track=best.track)
 
 
 def _bad(best: Found, out: Sequence[int]) -> list[int]:
@@ -152,8 +168,8 @@ def _bad(best: Found, out: Sequence[int]) -> list[int]:
     return [int(i) for i in outlying(best)] if len(out) < MOST_OUTLYING else []
 
 
-def _named(changes: Sequence[Selected]) -> list[tuple[int, str, int]]:
-    return [(one.found.unknown, one.found.shape, one.found.first) for one in changes]
+def _name(one: Selected) -> Name:
+    return one.found.unknown, one.found.shape, one.found.first
 
 
 def _shapes(changes: Sequence[Selected]) -> list[Change]:
