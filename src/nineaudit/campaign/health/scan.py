@@ -73,8 +73,9 @@ class Found:
 
 
 def scan(seen: Look, size: int, margin: float = np.inf) -> list[Found]:
-    """The best change of every unknown that is seen, the significant first, by what they explain, and while Z² is within
-    `margin` of the first; of what the model has already nothing is left to be seen. `size`: recordings of the campaign."""
+    """The best change of every unknown that is seen, the significant first, by what they explain, while Z² is within
+    `margin` of the first; of what the model has already nothing is left to be seen. `size`: recordings of the
+    campaign."""
     solution = seen.solution
     residuals = [solution.residual(one) for one in solution.marginals]
     ranked = [one for sight in seen.sights for one in _best(sight, residuals)]
