@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nineaudit.array import FloatArray
-from nineaudit.campaign.health.model import ANY_CHANGE, Change, Solution, moves, precision
+from nineaudit.campaign.health.model import ANY_CHANGE, AT_ONCE, Change, Solution, moves, precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +37,10 @@ def with_change(solution: Solution, change: Change) -> Solution:
 def levelled(solution: Solution, unknown: int, since: Sequence[Change]) -> tuple[Solution, Term]:
     """With the prior of an unknown that its changes ask for, not that of the changes `since`; what H⁻¹ gained."""
     before, after = (precision(solution.part, changes)[unknown] for changes in (since, solution.changes))
-    column = solution.cov[:, unknown]
+    column = solution.cov[:, unknown].copy()
     term = Term(column, float((before - after) / (1.0 - (before - after) * column[unknown])))
     x = solution.x + term.factor * solution.x[unknown] * column
-    return replace(solution, x=x, cov=solution.cov + np.outer(column, term.factor * column)), term
+    return replace(solution, x=x, cov=raised(solution.cov.copy(), column, term.factor)), term
 
 
 def bordered(solution: Solution, change: Change) -> Solution:
@@ -58,8 +58,9 @@ def bordered(solution: Solution, change: Change) -> Solution:
     by = np.append(-solution.cov @ across, 1.0)
     left = own + float(across @ by[:-1])
     far = (right - float(across @ solution.x)) / left
-    cov = np.outer(by, by / left)
-    cov[:size, :size] += solution.cov
+    cov = np.zeros((size + 1, size + 1))
+    cov[:size, :size] = solution.cov
+    raised(cov, by, float(1.0 / left))
     return replace(solution, changes=(*solution.changes, change), x=np.append(solution.x, 0.0) + far * by, cov=cov)
 
 
@@ -69,6 +70,14 @@ def unbordered(solution: Solution, number: int) -> tuple[Solution, Term]:
     column, kept = solution.cov[:, at], np.arange(len(solution.x)) != at
     term = Term(column, -1.0 / float(column[at]))
     x = (solution.x - solution.x[at] / column[at] * column)[kept]
-    cov = (solution.cov - np.outer(column, column / column[at]))[np.ix_(kept, kept)]
+    cov = raised(solution.cov[np.ix_(kept, kept)], column[kept], term.factor)
     changes = tuple(c for k, c in enumerate(solution.changes) if k != number)
     return replace(solution, changes=changes, x=x, cov=cov), term
+
+
+def raised(cov: FloatArray, column: FloatArray, factor: float) -> FloatArray:
+    """`cov` + `factor` `column` `column`ᵀ in its place, some rows at a time: memory."""
+    for start in range(0, len(cov), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
+        cov[some] += np.outer(factor * column[some], column)
+    return cov

@@ -27,6 +27,7 @@ from typing import Final
 import numpy as np
 
 from nineaudit.array import FloatArray, IntArray
+from nineaudit.campaign.health.border import raised
 from nineaudit.campaign.health.model import Solution
 from nineaudit.campaign.health.records import UNIT, Record
 from nineaudit.campaign.health.scan import FALSE_ALARM
@@ -174,7 +175,7 @@ def _without_prior(mine: Standing, cov: FloatArray, unknown: int) -> float:
 def _free(mine: Standing, x: FloatArray, cov: FloatArray, unknown: int) -> tuple[FloatArray, FloatArray]:
     """The solution without the prior of an unknown."""
     factor, column = _without_prior(mine, cov, unknown), cov[:, unknown]
-    return x + factor * x[unknown] * column, cov + np.outer(factor * column, column)
+    return x + factor * x[unknown] * column, raised(cov.copy(), column, factor)
 
 
 __all__ = ["LEVEL", "Level", "Standing", "levels_beyond", "standing"]
