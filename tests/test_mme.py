@@ -140,7 +140,6 @@ def test_a_channel_file_may_have_a_name_that_is_not_utf_8(tmp_path: Path) -> Non
     assert mme_files.fingerprint(path)[1] != before
 
 
-
 @pytest.mark.parametrize(
     ("content", "says"),
     [
