@@ -7,6 +7,7 @@ The recordings are simulated once, each with noise of its own, every tenth with 
 MCAP, BLF, ASC and ISO-MME in turn (--folder keeps them for the next run). Each plain process is a loop of audit_one
 over its share of the list, into another lake: what the machine can do without any scheduler; the mean of their times
 counts, for their shares are not quite equal. No reports are kept.
+Processor times are told, too: they hold where the machine is shared and the load changes from one to the other.
 Tasks that do nothing (--empty) tell what a task costs besides its audit. The exit code is 1 where the ratio is below
 0.90 or the client's memory grows.
 """
@@ -79,8 +80,15 @@ def plain(folder: Path, lake: str, names: list[str]) -> None:
         audit_one(str(folder / "tests" / one), folder / "rig.toml", lake=lake, dbc=dbc, reports="none")
 
 
-def by_processes(folder: Path, lake: Path, count: int, workers: int) -> list[float]:
-    """Seconds that each plain process takes."""
+def busy(process: psutil.Process) -> float:
+    """Processor time of a process and all below it that are there, s."""
+    times = [one.cpu_times() for one in (process, *process.children(recursive=True))]
+    return sum(one.user + one.system for one in times)
+
+
+def by_processes(folder: Path, lake: Path, count: int, workers: int) -> tuple[list[float], float]:
+    """Seconds that each plain process takes, and their processor time."""
+    before = os.times()
     command = [sys.executable, __file__, "--folder", str(folder), "--count", str(count), "--workers", str(workers)]
     began = time.perf_counter()
     running = [
@@ -94,28 +102,32 @@ def by_processes(folder: Path, lake: Path, count: int, workers: int) -> list[flo
             running.remove(process)
             seconds.append(time.perf_counter() - began)
         time.sleep(0.05)
-    return seconds
+    after = os.times()
+    return seconds, after.children_user + after.children_system - before.children_user - before.children_system
 
 
-def by_dask(folder: Path, lake: Path, count: int, workers: int) -> tuple[float, float, list[int]]:
-    """(seconds that a campaign takes, of these until the first is done, memory of the client now and then)."""
+def by_dask(folder: Path, lake: Path, count: int, workers: int) -> tuple[float, float, float, list[int]]:
+    """(seconds that a campaign takes, of these until the first is done, processor time of all, memory of the client now
+    and then)."""
     from nineaudit.campaign import campaigning
 
-    me, held, first = psutil.Process(), [], []
-    began = time.perf_counter()
+    me, held, first, worked = psutil.Process(), [], [], []
+    began, before = time.perf_counter(), busy(me)
 
     def watched(lake: object, done: object) -> object:
         for i, summary in enumerate(noted(lake, done)):
             first or first.append(time.perf_counter() - began)
             if i % max(count // 20, 1) == 0:
                 held.append(me.memory_info().rss)
+            if i == count - 1:  # workers and their audits are still there
+                worked.append(busy(me) - before)
             yield summary
 
     noted, campaigning._noted = campaigning._noted, watched
     plan = campaigning.Plan((str(table(folder, count)),), str(lake), workers=workers, reports="none", fail_on="never")
     plan.run(print, print)
     seconds = time.perf_counter() - began
-    return seconds, first[0], [*held, me.memory_info().rss]
+    return seconds, first[0], worked[0], [*held, me.memory_info().rss]
 
 
 def nothing(request: dict[str, object]) -> dict[str, object]:
@@ -141,17 +153,20 @@ def compare(folder: Path, count: int, workers: int, duration: float) -> bool:
     write(folder, count, duration)
     print(f"{count} recordings are there after {time.perf_counter() - began:.0f} s", flush=True)
     with tempfile.TemporaryDirectory() as place:
-        each = by_processes(folder, Path(place) / "plain", count, workers)
+        each, alone_busy = by_processes(folder, Path(place) / "plain", count, workers)
         alone = sum(each) / workers  # as if their shares took equally long
         told = ", ".join(f"{one:.0f}" for one in each)
         print(f"plain processes: {count / alone:.2f} recordings a second, {told} s", flush=True)
-        seconds, start, held = by_dask(folder, Path(place) / "dask", count, workers)
+        seconds, start, dask_busy, held = by_dask(folder, Path(place) / "dask", count, workers)
         same = [results(Path(place) / kind) for kind in ("plain", "dask")]
     assert same[0] == same[1], "the lakes differ"
     ratio, growth = alone / seconds, held[-1] - held[len(held) // 10]
     print(f"Dask: {count / seconds:.2f} recordings a second, {seconds:.0f} s, of these {start:.1f} s until the first")
     print(f"both lakes hold the same {len(same[0])} results, {sum(same[0].values()) / count / 1000:.1f} kB each")
     print(f"memory of the client: {held[0] / 2**20:.0f} MiB at first, {held[-1] / 2**20:.0f} MiB at the end")
+    print(
+        f"processor time of a recording: plain {alone_busy / count:.3f} s, Dask {dask_busy / count:.3f} s with its own"
+    )
     print(f"ratio {ratio:.3f} (asked: {RATIO:.2f})")
     return ratio >= RATIO and growth <= GROWTH
 
