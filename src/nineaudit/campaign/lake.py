@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from nineaudit.campaign.places import store_errors
+from nineaudit.campaign.stores import store_errors
 from nineaudit.errors import ConfigurationError
 from nineaudit.files import settle
 

@@ -5,36 +5,22 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import sys
 import tempfile
-import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
+from nineaudit.campaign.stores import asked, store_errors
 from nineaudit.errors import ConfigurationError
 from nineaudit.parts import Part, files, part_of
 
 SIDECAR: Final = ".provenance.json"
-_OF_CLIENTS: Final = {
-    "botocore.exceptions": ("BotoCoreError", "ClientError"),
-    "aiohttp": ("ClientError",),
-    "ftplib": ("Error",),
-}
-"""What clients of stores raise that is no OSError."""
 _TELLING: Final = (
     *("ETag", "etag", "CRC", "md5Hash", "Content-MD5", "Digest"),
     *("Last-Modified", "LastModified", "last_modified", "mtime", "modify", "modificationTime", "created"),
 )
 """What stores call an entity tag, a checksum or a time of change; the first that is there counts."""
-
-
-def store_errors() -> tuple[type[Exception], ...]:
-    """What says that a place cannot be opened, reached or read, as of now: clients are loaded when they are needed."""
-    loaded = [(sys.modules[module], names) for module, names in _OF_CLIENTS.items() if module in sys.modules]
-    others = [getattr(module, name) for module, names in loaded for name in names]
-    return (OSError, ImportError, ValueError, zipfile.BadZipFile, *others)
 
 
 def split(uri: str) -> tuple[str, str, str]:
@@ -89,17 +75,6 @@ def read_bytes(uri: str, what: str) -> bytes:
     except store_errors() as error:
         said = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise ConfigurationError(f"{what}: {said}", file=uri) from error
-
-
-@contextmanager
-def asked() -> Iterator[None]:
-    """A store is asked in it: OSError, whatever its client raises."""
-    try:
-        yield
-    except OSError:
-        raise
-    except store_errors() as error:
-        raise OSError(str(error)) from error
 
 
 def signature(uris: Sequence[str]) -> str | None:

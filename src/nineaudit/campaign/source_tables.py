@@ -11,7 +11,8 @@ from datetime import date, datetime
 from pathlib import PurePosixPath
 from typing import Any, Final
 
-from nineaudit.campaign.places import name_of, read_bytes, store_errors
+from nineaudit.campaign.places import name_of, read_bytes
+from nineaudit.campaign.stores import store_errors
 from nineaudit.errors import ConfigurationError
 
 TABLES: Final = (".csv", ".tsv", ".parquet", ".jsonl", ".ndjson")

@@ -15,7 +15,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from nineaudit.campaign.places import is_local, split, store_errors
+from nineaudit.campaign.places import is_local, split
+from nineaudit.campaign.stores import store_errors
 from nineaudit.errors import ConfigurationError
 
 GLOB: Final = frozenset("*?[")
