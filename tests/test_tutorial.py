@@ -40,13 +40,10 @@ def expected_code(command: str) -> int:
     return int(found)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("tutorial")
-
-
-def test_the_page_shows_what_its_commands_do(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
+def test_the_page_shows_what_its_commands_do_and_says_what_is_filed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     kinds = [kind for kind, _, _ in steps()]
     assert (kinds.count("run"), kinds.count("write")) == (11, 1)
     for kind, subject, text in steps():
@@ -56,10 +53,11 @@ def test_the_page_shows_what_its_commands_do(folder: Path, monkeypatch: pytest.M
         code, shown = run(subject)
         assert code == expected_code(subject), shown
         assert HASH.sub("#", shown) == HASH.sub("#", text), subject
+    check_what_is_filed(tmp_path)
 
 
-def test_what_is_filed_says_what_the_page_says(folder: Path) -> None:
-    """The text of the page: the culprit, the roll, the effect on BrIC and HIC, the waiver that stays visible."""
+def check_what_is_filed(folder: Path) -> None:
+    """As the text of the page says: the culprit, the roll, the effect on BrIC and HIC, the waiver that stays visible."""
     before, after = (
         json.loads((folder / name).read_text(encoding="utf-8")) for name in ("T0042.json", "T0042-repaired.json")
     )
