@@ -57,7 +57,7 @@ def test_the_page_shows_what_its_commands_do_and_says_what_is_filed(
 
 
 def check_what_is_filed(folder: Path) -> None:
-    """As the text of the page says: the culprit, the roll, the effect on BrIC and HIC, the waiver that stays visible."""
+    """As the page says: the culprit, the roll, the effect on BrIC and HIC, the waiver that stays visible."""
     before, after = (
         json.loads((folder / name).read_text(encoding="utf-8")) for name in ("T0042.json", "T0042-repaired.json")
     )
