@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from nineaudit.campaign.stores import store_errors
+from nineaudit.campaign.stores import told
 from nineaudit.errors import ConfigurationError
 from nineaudit.files import settle
 
@@ -59,10 +59,8 @@ def open_lake(uri: str | os.PathLike[str], create: bool = False) -> Lake:
     from fsspec.core import url_to_fs
 
     named = os.fspath(uri)
-    try:
+    with told(named, "cannot be opened"):
         fs, root = url_to_fs(named)
-    except store_errors() as error:
-        raise ConfigurationError(f"cannot be opened: {error}", file=named) from error
     lake = Lake(fs, root.rstrip("/"), named)
     _require_lake(lake, create)
     return lake
@@ -230,13 +228,11 @@ def _pointer(edition: str, uri: str) -> str:
 
 
 def _require_lake(lake: Lake, create: bool) -> None:
-    try:
+    with told(lake.uri, "cannot be opened"):
         found = read(lake, "lake.json")
         if found is None and create:
             write(lake, "lake.json", {"schema": LAKE})
             return
-    except store_errors() as error:
-        raise ConfigurationError(f"cannot be opened: {error}", file=lake.uri) from error
     if found is None:
         raise ConfigurationError("is no lake", file=lake.uri, advice="`nineaudit campaign run` makes one")
     if found.get("schema") != LAKE:

@@ -11,8 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from nineaudit.campaign.stores import asked, store_errors
-from nineaudit.errors import ConfigurationError
+from nineaudit.campaign.stores import asked, told
 from nineaudit.parts import Part, files, part_of
 
 SIDECAR: Final = ".provenance.json"
@@ -69,12 +68,9 @@ def read_bytes(uri: str, what: str) -> bytes:
     """The content of a file. ConfigurationError, which begins with `what`."""
     from fsspec.core import url_to_fs
 
-    try:
+    with told(uri, what):
         fs, path = url_to_fs(uri)
         return bytes(fs.cat_file(path))
-    except store_errors() as error:
-        said = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise ConfigurationError(f"{what}: {said}", file=uri) from error
 
 
 def signature(uris: Sequence[str]) -> str | None:

@@ -116,10 +116,7 @@ def _windowed(
         request = pending.pop(future.key)
         if future.status == "cancelled" or client.status != "running":
             raise _lost(scheduler)
-        if future.status not in (
-            "finished",
-            "error",
-        ):  # its worker died before the summary was here: Dask does it again
+        if future.status not in ("finished", "error"):  # its worker died before the summary was here: done again
             pending[future.key] = request
             done.add(future)
             continue

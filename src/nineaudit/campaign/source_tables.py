@@ -12,7 +12,7 @@ from pathlib import PurePosixPath
 from typing import Any, Final
 
 from nineaudit.campaign.places import name_of, read_bytes
-from nineaudit.campaign.stores import store_errors
+from nineaudit.campaign.stores import told
 from nineaudit.errors import ConfigurationError
 
 TABLES: Final = (".csv", ".tsv", ".parquet", ".jsonl", ".ndjson")
@@ -126,22 +126,18 @@ def _opened(uri: str) -> Iterator[Any]:
     from fsspec.core import url_to_fs
     from pyarrow.lib import ArrowException
 
-    try:
+    with told(uri, "cannot be read", also=(ArrowException, OverflowError)):  # OverflowError: a date that Python has not
         fs, path = url_to_fs(uri)
         with fs.open(path, "rb") as file:
             yield file
-    except (ArrowException, OverflowError, *store_errors()) as error:  # OverflowError: a date that Python has not
-        raise ConfigurationError(f"cannot be read: {error}", file=uri) from error
 
 
 def _head(uri: str) -> bytes:
     from fsspec.core import url_to_fs
 
-    try:
+    with told(uri, "cannot be read"):
         fs, path = url_to_fs(uri)
         return bytes(fs.cat_file(path, start=0, end=_HEAD))
-    except store_errors() as error:
-        raise ConfigurationError(f"cannot be read: {error}", file=uri) from error
 
 
 def _column(name: str) -> str:

@@ -9,15 +9,13 @@ import os
 import struct
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from nineaudit.campaign.places import is_local, split
-from nineaudit.campaign.stores import store_errors
-from nineaudit.errors import ConfigurationError
+from nineaudit.campaign.stores import told
 
 GLOB: Final = frozenset("*?[")
 _DAMAGED: Final[tuple[type[Exception], ...]] = (NotImplementedError, OverflowError, EOFError, struct.error)
@@ -97,7 +95,7 @@ def opened(uri: str) -> tuple[Any, str]:
     """(file system, path in it) of a uri. ConfigurationError."""
     from fsspec.core import url_to_fs
 
-    with _told(uri, "cannot be opened"):
+    with told(uri, "cannot be opened", also=_DAMAGED):
         fs, path = url_to_fs(uri)
         return fs, str(path)
 
@@ -105,24 +103,15 @@ def opened(uri: str) -> tuple[Any, str]:
 def exists(uri: str) -> bool:
     """Whether something is there. ConfigurationError where the store cannot be asked."""
     fs, path = opened(uri)
-    with _told(uri, "cannot be opened"):
+    with told(uri, "cannot be opened", also=_DAMAGED):
         return bool(fs.exists(path))
 
 
 def is_folder(uri: str) -> bool:
     """Whether it is a folder. ConfigurationError where the store cannot be asked."""
     fs, path = opened(uri)
-    with _told(uri, "cannot be opened"):
+    with told(uri, "cannot be opened", also=_DAMAGED):
         return bool(fs.isdir(path))
-
-
-@contextmanager
-def _told(uri: str, what: str, advice: str | None = None) -> Iterator[None]:
-    try:
-        yield
-    except (*store_errors(), *_DAMAGED) as error:
-        said = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise ConfigurationError(f"{what}: {said}", file=uri, advice=advice) from error
 
 
 def _sorted(home: _Home, files: Iterable[str]) -> list[File]:
@@ -172,7 +161,7 @@ def _fitting(part: str, paths: list[str], among: list[str]) -> list[str]:
 def _listed(home: _Home, folder: str) -> _Listing:
     """What is in a folder; nothing in one that went meanwhile."""
     listing = _Listing([], [], [])
-    with _told(home.written(folder).uri, "cannot be listed", "leave it out with --exclude"):
+    with told(home.written(folder).uri, "cannot be listed", "leave it out with --exclude", _DAMAGED):
         try:
             entries = home.fs.ls(folder, detail=True)
         except FileNotFoundError:
