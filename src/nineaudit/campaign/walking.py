@@ -6,7 +6,6 @@ fsspec's own walk passes over what it cannot list and lists a link to a folder a
 from __future__ import annotations
 
 import os
-import struct
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -16,13 +15,11 @@ from typing import Any, Final, NamedTuple
 
 from nineaudit.campaign.places import is_local, split
 from nineaudit.campaign.stores import told
+from nineaudit.readers.mme.files import BROKEN
 
 GLOB: Final = frozenset("*?[")
-_DAMAGED: Final[tuple[type[Exception], ...]] = (NotImplementedError, OverflowError, EOFError, struct.error)
-"""What zipfile raises of the directory of a damaged archive, beside BadZipFile and ValueError."""
-
 OF_A_TEST: Final = frozenset({"channel", "diagram", "document", "movie", "photo", "report", "static"})
-"""Folders, in small letters, of an ISO-MME test, beside its .mme file: ISO/TS 13499 RED A."""
+"""Folders, in small letters, of an ISO-MME test, beside its .mme file, as archives have them; not compared with the text of ISO/TS 13499."""
 
 Skip = Callable[[str], bool]
 """Whether the folder of a path, as it is written, is left out."""
@@ -95,7 +92,7 @@ def opened(uri: str) -> tuple[Any, str]:
     """(file system, path in it) of a uri. ConfigurationError."""
     from fsspec.core import url_to_fs
 
-    with told(uri, "cannot be opened", also=_DAMAGED):
+    with told(uri, "cannot be opened", also=BROKEN):
         fs, path = url_to_fs(uri)
         return fs, str(path)
 
@@ -103,14 +100,14 @@ def opened(uri: str) -> tuple[Any, str]:
 def exists(uri: str) -> bool:
     """Whether something is there. ConfigurationError where the store cannot be asked."""
     fs, path = opened(uri)
-    with told(uri, "cannot be opened", also=_DAMAGED):
+    with told(uri, "cannot be opened", also=BROKEN):
         return bool(fs.exists(path))
 
 
 def is_folder(uri: str) -> bool:
     """Whether it is a folder. ConfigurationError where the store cannot be asked."""
     fs, path = opened(uri)
-    with told(uri, "cannot be opened", also=_DAMAGED):
+    with told(uri, "cannot be opened", also=BROKEN):
         return bool(fs.isdir(path))
 
 
@@ -161,7 +158,7 @@ def _fitting(part: str, paths: list[str], among: list[str]) -> list[str]:
 def _listed(home: _Home, folder: str) -> _Listing:
     """What is in a folder; nothing in one that went meanwhile."""
     listing = _Listing([], [], [])
-    with told(home.written(folder).uri, "cannot be listed", "leave it out with --exclude", _DAMAGED):
+    with told(home.written(folder).uri, "cannot be listed", "leave it out with --exclude", BROKEN):
         try:
             entries = home.fs.ls(folder, detail=True)
         except FileNotFoundError:

@@ -27,7 +27,7 @@ LARGEST: Final = 128 * 2**20
 MOST_CHANNELS: Final = 5000
 _STEP: Final = 2**20
 _CHANNEL: Final = re.compile(r"\.\d{3,}$")
-_BROKEN: Final = (zipfile.BadZipFile, NotImplementedError, ValueError, OverflowError, struct.error, EOFError)
+BROKEN: Final = (zipfile.BadZipFile, NotImplementedError, ValueError, OverflowError, struct.error, EOFError)
 """What zipfile raises of the directory of a damaged archive."""
 
 Reader = Callable[[str, int], tuple[bytes, tuple[Damage, ...]]]
@@ -118,7 +118,7 @@ def _directory(path: Path) -> tuple[dict[str, zipfile.ZipInfo], tuple[Damage, ..
     try:
         with zipfile.ZipFile(path) as archive:
             return {info.filename: info for info in archive.infolist()}, ()
-    except _BROKEN as error:
+    except BROKEN as error:
         infos = {info.filename: info for info in _salvaged(path)}
         what = f"the directory of the archive cannot be read ({error})"
         if not infos:
