@@ -19,7 +19,7 @@ from nineaudit.readers.mme.files import BROKEN
 
 GLOB: Final = frozenset("*?[")
 OF_A_TEST: Final = frozenset({"channel", "diagram", "document", "movie", "photo", "report", "static"})
-"""Folders, in small letters, of an ISO-MME test, beside its .mme file, as archives have them; not compared with the text of ISO/TS 13499."""
+"""Folders, in small letters, of an ISO-MME test, beside its .mme file; not compared with the text of ISO/TS 13499."""
 
 Skip = Callable[[str], bool]
 """Whether the folder of a path, as it is written, is left out."""
